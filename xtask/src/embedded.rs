@@ -14,7 +14,7 @@ use crate::process::{TEST_BUILD_ARGUMENTS, cargo, installed_targets, output, tar
 /// Target that is built and run; `RISC_V_TARGET` is only built.
 pub const CORTEX_TARGET: &str = "thumbv7em-none-eabihf";
 const RISC_V_TARGET: &str = "riscv32imac-unknown-none-elf";
-/// Default length of the run under QEMU, s; QEMU runs at a fiftieth of the host's speed.
+/// Default length of the run under QEMU (s); QEMU runs at a fiftieth of the host's speed.
 const DEFAULT_RUN_S: usize = 15;
 const RATE_HZ: usize = 100;
 

@@ -2,8 +2,8 @@
 //!
 //! The readers are control engineers. The words in [`BANNED_WORDS`] occurred in sentences that such readers would
 //! rewrite: metaphors of speaking, standing and believing, nouns made from questions, and archaic words. The table
-//! contains a replacement for each word, which the check prints with file and line. Code spans (in backticks) and
-//! format arguments are not prose.
+//! contains a replacement for each word, which the check prints with the file and the line. Code spans (in backticks)
+//! and format arguments are not prose.
 //!
 //! `cargo xtask check` applies the list to comments and string literals of Rust and Python sources, `cargo xtask words
 //! --book` to the pages of the book, the README and ARCHITECTURE.md.
@@ -71,7 +71,7 @@ const EXCEPTIONS: [(&str, &str); 2] = [
 /// Checks comments and string literals of the sources.
 ///
 /// # Errors
-/// The words found, with file and line.
+/// The words found, with the file and the line.
 pub fn check() -> Result<(), String> {
     let of_sources = |path: &str| path.ends_with(".rs") || path.ends_with(".py") || path.ends_with(".pyi");
     report(&find_banned_words(of_sources)?)
@@ -80,7 +80,7 @@ pub fn check() -> Result<(), String> {
 /// Checks the book, the README and ARCHITECTURE.md.
 ///
 /// # Errors
-/// The words found, with file and line.
+/// The words found, with the file and the line.
 pub fn check_book() -> Result<(), String> {
     let of_book = |path: &str| {
         path == "README.md" || path == "ARCHITECTURE.md" || path.starts_with("docs/src/") && path.ends_with(".md")

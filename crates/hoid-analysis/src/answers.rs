@@ -214,8 +214,8 @@ pub(crate) fn trace_answers(trace: &Trace) -> Vec<AnswerStatus> {
     all
 }
 
-/// Returns crossover and margins of a polynomial model in the frequency range of manual control, limited to half the
-/// sampling frequency: the sampled model contains no information above it.
+/// Returns the crossover and margins of a polynomial model in the frequency range of manual control, limited to half
+/// the sampling frequency: the sampled model contains no information above it.
 pub fn loop_margins(fit: &Fit, element: &ContinuousTransferFunction) -> MarginEstimates {
     let (low, high) = MANUAL_CONTROL_RANGE_RAD_S;
     let high = high.min(fit.model().sample_time().nyquist_rad_s());

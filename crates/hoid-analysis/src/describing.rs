@@ -53,7 +53,7 @@ pub struct DescribingFunctionResult {
 }
 
 impl DescribingFunctionResult {
-    /// Returns crossover and margins with the controlled element; `None` if the controlled element is unknown.
+    /// Returns the crossover and margins with the controlled element; `None` if the controlled element is unknown.
     pub fn margins(&self) -> Option<&MarginEstimates> {
         self.found.margins.as_ref().map(|margins| &margins.estimates)
     }

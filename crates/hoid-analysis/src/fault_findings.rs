@@ -14,7 +14,7 @@ pub struct FoundFault {
     pub kind: &'static str,
     /// Name of the channel; empty if the fault concerns all channels or the time.
     pub channel: String,
-    /// Time of the first sample of the fault, s; `None` if the fault has no location in time.
+    /// Time of the first sample of the fault (in s); `None` if the fault has no location in time.
     #[serde(rename = "from")]
     pub from_s: Option<f64>,
     /// Time of the first sample after the fault, s.

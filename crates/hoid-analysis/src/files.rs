@@ -46,7 +46,7 @@ impl Reading {
     /// Reads one file: its record, or the records between masked rows.
     ///
     /// # Errors
-    /// As [`Reading::read_files`].
+    /// Same as [`Reading::read_files`].
     pub fn read_segments(&self, path: &Path) -> Result<Vec<ReadRecord>, AnalysisError> {
         read_segments(path, &self.options, &self.preparation, &self.mask, self.shortest_s)
             .map_err(|error| AnalysisError::from_reading(error, path, &self.options))
@@ -55,7 +55,7 @@ impl Reading {
     /// Reads the record of a file that contains one trial.
     ///
     /// # Errors
-    /// As [`Reading::read_files`].
+    /// Same as [`Reading::read_files`].
     pub fn single_record(&self, path: &Path) -> Result<ReadRecord, AnalysisError> {
         read_prepared(path, &self.options, &self.preparation)
             .map_err(|error| AnalysisError::from_reading(error, path, &self.options))
@@ -64,7 +64,7 @@ impl Reading {
     /// Reads one file without masking.
     ///
     /// # Errors
-    /// As [`Reading::read_files`].
+    /// Same as [`Reading::read_files`].
     pub fn read_file(
         &self,
         path: &Path,

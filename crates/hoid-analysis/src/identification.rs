@@ -12,7 +12,7 @@ pub struct Identification<E = FamilyEstimator> {
     pub estimator: E,
     /// The channel of the recorded disturbance or target.
     pub excitation: Excitation,
-    /// Period of the excitation, s; determined from its lines if `None`.
+    /// Period of the excitation (in s); determined from its lines if `None`.
     pub period_s: Option<f64>,
     /// Treatment of faults of the recordings.
     pub faults: FaultHandling,

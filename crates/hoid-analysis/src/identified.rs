@@ -62,7 +62,7 @@ pub struct ValidationResult {
 /// Identifies the operator of a person from the runs of the person, with default settings.
 ///
 /// # Errors
-/// As [`Identification::run`].
+/// Same as [`Identification::run`].
 pub fn identify(records: &[Record]) -> Result<IdentifiedModel, AnalysisError> {
     Identification::default().run(Recordings::from_records(records.iter().cloned()))
 }
@@ -165,7 +165,7 @@ impl<F: Answers> IdentifiedModel<F> {
 }
 
 impl IdentifiedModel {
-    /// Returns VAF and NRMSE over all recordings, where each recording is predicted by its own operator.
+    /// Returns the VAF and NRMSE over all recordings, where each recording is predicted by its own operator.
     ///
     /// # Errors
     /// The errors of predicting the records.

@@ -7,5 +7,5 @@ pub const OPERATOR: &str = "operator";
 pub const REMNANT: &str = "operator noise=remnant";
 /// Operator whose gains change once.
 pub const CHANGE: &str = "operator change=sigmoid";
-/// Polynomials fitted by the prediction error method.
+/// Polynomials fitted by the prediction-error method.
 pub const PEM: &str = "pem";

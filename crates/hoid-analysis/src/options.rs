@@ -1,5 +1,5 @@
 //! Options of an identification, set as text by their names in the [registry](crate::registry). The command line, plans
-//! and Python convert their input to text, and have no option lists of their own.
+//! and Python convert their input to text, and have no separate lists of options.
 //!
 //! An estimator declares its options next to its fields. This module declares the options of the analysis: the recorded
 //! excitation, the controlled element, the answers to which the verdict refers, and a prior from a file.

@@ -32,7 +32,7 @@ pub fn parse_prior(text: &str) -> Result<OperatorPrior, AnalysisError> {
         OperatorPrior::from_parameters(parameters.map(|p| (p.name.as_str(), p.estimate, p.determined)), source)?;
     if prior.entries().is_empty() {
         return Err(refuse(format!(
-            "{source}: no parameter is determined and has a standard error"
+            "{source}: no determined parameter has a standard error"
         )));
     }
     Ok(prior)

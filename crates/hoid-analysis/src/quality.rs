@@ -44,7 +44,7 @@ pub(crate) fn findings_of_quality(account: &Account, record: &Record, of: System
         let finding = Finding::warning(
             "stick-at-its-end",
             format!(
-                "{output} is saturated in {:.0} % of the samples: gain and margins are biased",
+                "{output} is saturated in {:.0} % of the samples: the gain and margins are biased",
                 100.0 * share
             ),
         );

@@ -28,7 +28,7 @@ impl Setting {
         }
     }
 
-    /// Sets the flag that the user gave the value.
+    /// Sets whether the user gave the value.
     #[must_use]
     pub fn with_given(self, given: bool) -> Self {
         Self {

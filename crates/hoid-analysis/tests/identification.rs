@@ -16,7 +16,7 @@ use hoid_model::{
 };
 use hoid_sim::{RunSeed, Simulator};
 
-/// A run as recorded, which contains only e and u.
+/// Returns a run as recorded, with only e and u.
 fn recorded_run(seed: u64, change: impl Fn(f64, f64) -> (f64, f64)) -> Record {
     let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
     let run = RunSeed {
@@ -341,7 +341,7 @@ fn every_estimator_reports_saturated_recordings() {
     );
 }
 
-/// A furnace sampled every 9 s with a two-level input: the rules for people do not apply.
+/// The rules for people do not apply to a furnace that is sampled every 9 s and has a two-level input.
 #[test]
 fn rules_for_people_do_not_apply_to_polynomials() {
     let noise = |seed: u64| {

@@ -12,7 +12,7 @@ pub type ConversionResult = Result<FamilyConversion, NotConvertible>;
 pub fn to_text(found: &ConversionResult, gain: &GainUnit) -> String {
     let found = match found {
         Ok(found) => found,
-        Err(reason) => return format!("The model does not convert to an operator: {reason}.\n"),
+        Err(reason) => return format!("The model cannot be converted to an operator: {reason}.\n"),
     };
     let all = found.parameters();
     let named = all.iter().map(|(name, unit, e)| (*name, gain.unit(name, unit), *e));

@@ -29,7 +29,7 @@ pub fn print(text: &str) -> Result<(), CliError> {
 /// Writes a page of text to standard output, with sentences wrapped at the width of the screen.
 ///
 /// # Errors
-/// As [`print`].
+/// Same as [`print`].
 pub fn show(page: &str) -> Result<(), CliError> {
     let page = width().map_or_else(|| page.to_owned(), |width| wrapped(page, width));
     match AutoStream::choice(&io::stdout()) {
@@ -144,7 +144,7 @@ pub fn print_notices() {
 /// is remembered.
 ///
 /// # Errors
-/// As [`print`].
+/// Same as [`print`].
 pub fn check_written(written: io::Result<()>) -> Result<(), CliError> {
     match written.and_then(|()| io::stdout().flush()) {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => {
@@ -169,8 +169,8 @@ pub fn print_message(text: &str) {
     let _ = writeln!(io::stderr().lock(), "{text}");
 }
 
-/// Returns a progress bar on standard error with rate and remaining time; it is hidden if standard error is not a
-/// terminal.
+/// Returns a progress bar on standard error with the rate and the remaining time; it is hidden if standard error is not
+/// a terminal.
 pub fn progress_bar(total: usize, what: &str) -> ProgressBar {
     let bar = ProgressBar::new(total as u64);
     // With an invalid template, the plain bar is used.

@@ -94,7 +94,7 @@ fn request_from_orders(
 /// Returns the requested recursion over a record.
 ///
 /// # Errors
-/// As [`request`].
+/// Same as [`request`].
 pub fn tracking(args: &TrackArgs) -> Result<Tracking, CliError> {
     let recursion = match (args.read.inputs.len(), &args.role) {
         (2.., _) => two_input_request(args)?,

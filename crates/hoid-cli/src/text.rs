@@ -288,7 +288,7 @@ pub fn operator(found: &Result<OperatorEstimate, NotConvertible>, gain: &GainUni
             };
             format!("{rows}\n{warning}")
         }
-        Err(reason) => format!("The model does not convert to an operator: {reason}.\n"),
+        Err(reason) => format!("The model cannot be converted to an operator: {reason}.\n"),
     }
 }
 
@@ -302,7 +302,7 @@ pub fn remnant(found: &Result<RemnantEstimate, NotConvertible>) -> String {
                 r.order, r.discretisation
             )
         }
-        Err(reason) => format!("The noise model does not convert to a remnant filter: {reason}.\n"),
+        Err(reason) => format!("The noise model cannot be converted to a remnant filter: {reason}.\n"),
     }
 }
 

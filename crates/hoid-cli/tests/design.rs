@@ -154,7 +154,7 @@ fn difference_gives_the_number_of_people() {
     assert!(phase("1").to_bits() == phase("1").to_bits() && phase("1").to_bits() != phase("2").to_bits());
 }
 
-/// A design for the people of a group, from its printed result, and for its population.
+/// A design for people, given by the printed result of a group or by a population, has a typical and a worst person.
 #[test]
 fn group_design_has_a_typical_and_a_worst_person() {
     let directory = TempDir::new().unwrap();
@@ -275,7 +275,7 @@ fn both_responses_to_a_displayed_target_are_designed() {
     assert!((again["against"]["rms_e"].as_f64().unwrap() / again["rms_e"].as_f64().unwrap() - 1.0).abs() < 1e-6);
 }
 
-/// The spread of a difference between people, from a comparison, a group and a population.
+/// The spread of a difference between people can come from a comparison, a group or a population.
 #[test]
 fn spread_of_a_difference_comes_from_the_people() {
     let directory = TempDir::new().unwrap();

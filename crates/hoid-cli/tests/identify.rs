@@ -269,7 +269,7 @@ fn change_is_found_and_its_gains_are_written() {
     assert_eq!(trace.lines().count(), 8195);
 }
 
-/// The example of the book: a lead-lag whose gain and lead change.
+/// The example of the book, a lead-lag whose gain and lead change, is identified.
 #[test]
 fn documented_lead_lag_change_is_found() {
     let directory = TempDir::new().unwrap();
@@ -534,7 +534,7 @@ fn simulation_with_little_noise_is_identified() {
             (&"lead".into(), &"trustworthy".into()),
             "{level}"
         );
-        // For a gain the tolerance is 0.3 sqrt(share) plus rounding.
+        // The relative tolerance is 0.3 times the square root of the noise level.
         let allowed = 0.3 * level.parse::<f64>().unwrap().sqrt();
         for (name, expected) in [("K_e", 0.09), ("K_e_dot", 0.036), ("tau_e", 0.28)] {
             let value = found["operator"][name]["value"].as_f64().unwrap();

@@ -167,7 +167,7 @@ fn printing_commands() -> Vec<Vec<&'static str>> {
     ]
 }
 
-/// Returns exit code and standard error of a command with redirected output.
+/// Returns the exit code and standard error of a command with redirected output.
 fn run_redirected(directory: &Path, arguments: &[&str], out: Stdio) -> (Option<i32>, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_hoid"))
         .args(arguments)
@@ -226,7 +226,7 @@ fn closed_output_pipe_does_not_abort_the_work() {
     assert!(rows.lines().count() > 8192);
 }
 
-/// The shell of the test sets a limit on the size of files.
+/// The shell of the test limits the size of files; no file is left incomplete.
 #[cfg(target_os = "linux")]
 #[test]
 fn file_size_limit_leaves_complete_files() {

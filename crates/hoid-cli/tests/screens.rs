@@ -159,7 +159,7 @@ fn mistakes_are_answered_with_suggestions() {
     }
 }
 
-/// Typical files of users, with other names, decimal commas, no units, and t in ms.
+/// Typical files of users (with other names, decimal commas, no units, or t in ms) are read or refused with advice.
 #[test]
 fn unprepared_files_are_read_or_refused_with_advice() {
     let directory = simulated_runs();
@@ -215,7 +215,7 @@ fn unprepared_files_are_read_or_refused_with_advice() {
         page("mine.csv", &["--unit", "e=degrees,u=radians"]),
         page("mine.csv", &["--unit", "e=deg,u=rad"])
     );
-    // The columns have other names than e and u, and there are no units; six table columns fit into 80 characters.
+    // The columns have names other than e and u, and there are no units; six table columns fit into 80 characters.
     let info = output_at_width(d, "80", &["info", "mine.csv"]);
     assert!(info.contains(" column") && !info.contains("unit"), "{info}");
     assert!(info.lines().all(|line| line.chars().count() <= 80), "{info}");

@@ -104,7 +104,7 @@ fn both_responses_are_exact_without_noise() {
     }
 }
 
-/// At 40.96 s both the condition and the response to the target change.
+/// At 81.92 s both the condition and the response to the target change; the response is found in both halves.
 #[test]
 fn changed_response_is_found_in_both_halves() {
     let at = TempDir::new().unwrap();

@@ -52,8 +52,8 @@ fn exact_data_give_exact_coefficients() {
     assert_eq!(finding_kinds(&found), ["no-noise"]);
 }
 
-/// A furnace at a level of 13.5, with a step of 10 after 3 s at rest, a dead time of .35 s, a lag of 1.5 s and a gain
-/// of 2.
+/// The step response of a furnace at a level of 13.5 (a step of 10 after 3 s at rest) gives its dead time of .35 s, its
+/// lag of 1.5 s, its gain of 2, and the level.
 #[test]
 fn step_response_gives_gain_lag_and_level() {
     let directory = TempDir::new().unwrap();

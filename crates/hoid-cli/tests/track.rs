@@ -26,7 +26,7 @@ fn track_json(directory: &Path, more: &[&str]) -> Value {
     json(directory, &with_physical_method(&arguments))
 }
 
-/// Returns header and rows of a trace; an empty cell is NaN.
+/// Returns the header and rows of a trace; an empty cell is NaN.
 fn trace(directory: &Path) -> (Vec<String>, Vec<Vec<f64>>) {
     let text = fs::read_to_string(directory.join("trace.csv")).unwrap();
     let mut lines = text.lines().filter(|l| !l.starts_with('#'));
@@ -279,7 +279,7 @@ fn every_method_structure_and_forgetting_rule_runs() {
     assert!(column(&trace(d), "tau_e_se").iter().all(|e| *e > 0.0));
 }
 
-/// Returns value and standard error in the columns of a quantity in the last row.
+/// Returns the value and standard error in the columns of a quantity in the last row.
 fn last_value(trace: &(Vec<String>, Vec<Vec<f64>>), name: &str) -> (f64, f64) {
     let of = |name: &str| *column(trace, name).last().unwrap();
     (of(name), of(&format!("{name}_se")))

@@ -26,7 +26,7 @@ use hoid_core::{
 
 const SAMPLE_COUNT: usize = 8192;
 
-/// Returns input and output of a Box-Jenkins model with the poles of the operator, and noise from a fixed generator.
+/// Returns the input and output of a Box-Jenkins model with the poles of the operator and noise from a fixed generator.
 fn data() -> Vec<(f64, f64)> {
     let mut state = 1u64;
     let mut noise = move || {
@@ -127,7 +127,7 @@ fn run_bare_rls(data: &[(f64, f64)], history: &mut Vec<[f64; 4]>) {
     }
 }
 
-/// The same for the prediction-error method.
+/// The prediction-error method without error bars, also for comparison: no guard, and no limit on outliers.
 fn run_bare_rpem(data: &[(f64, f64)], history: &mut Vec<[f64; 5]>) {
     history.clear();
     let mut recursion = Rpem::<_, 5, 0, _, _>::new(

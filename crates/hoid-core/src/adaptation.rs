@@ -5,7 +5,7 @@
 //! Söderström, *Theory and Practice of Recursive Identification*, 1983, section 3.4), with P in units of the innovation
 //! variance. Before this update, forgetting increases P:
 //!
-//! | rule of forgetting | P | source |
+//! | forgetting rule | P | source |
 //! |---|---|---|
 //! | [`Forgetting::Exponential`] | `Lambda P Lambda`, `Lambda = diag(lambda_i)^{-1/2}`; equal lambda_i give the scalar forgetting factor | eq. 5.26 |
 //! | [`Forgetting::RandomWalk`] | `P + Q`: Kalman filter for drifting parameters | Ljung and Söderström, eq. 2.104 |
@@ -51,10 +51,10 @@ pub enum Forgetting<const N: usize> {
     },
 }
 
-/// Change of the estimate that one sample causes.
+/// Change in the estimate caused by one sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ParameterStep<const N: usize> {
-    /// Change of theta.
+    /// Change in theta.
     pub step: [f64; N],
     /// Gain g. `step = g eps`, except with a rectangular window.
     pub gain: [f64; N],
@@ -79,7 +79,7 @@ pub trait Adaptation<const N: usize> {
     fn own_covariance(&self) -> Option<[[f64; N]; N]> {
         None
     }
-    /// Adds the parameter drift that the rule of forgetting assumes for one sample to the error bars.
+    /// Adds to the error bars the parameter drift that the forgetting rule assumes for one sample.
     fn add_drift_to<const K: usize, B: ErrorPropagation<N, K>>(&self, _bars: &mut B) {}
     /// True if the step depends on sigma^2.
     fn needs_innovation_variance(&self) -> bool {

@@ -1,4 +1,4 @@
-//! Gain of the prediction-error method, computed from P, with a rule of forgetting and protection against windup.
+//! Gain of the prediction-error method, computed from P, with a forgetting rule and protection against windup.
 //!
 //! The equations are in [`crate::adaptation`].
 //!
@@ -27,7 +27,7 @@ const MIN_EARLY_FORGETTING: f64 = 1e-9;
 /// Maximum number of samples between two pseudo-measurements.
 const MAX_GUARD_PERIOD: f64 = 64.0;
 
-/// P in factored form, with a rule of forgetting.
+/// P in factored form, with a forgetting rule.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Covariance<const N: usize> {
     factors: UdCovariance<N>,
@@ -139,7 +139,7 @@ impl<const N: usize> Covariance<N> {
         self.factors.matrix()
     }
 
-    /// Returns the step for any rule of forgetting, including the additional forgetting of early samples.
+    /// Returns the step for any forgetting rule, including the additional forgetting of early samples.
     /// [`Adaptation::update`] itself handles exponential forgetting without early forgetting.
     #[inline(never)]
     fn update_by_rule(&mut self, psi: &[f64; N], eps: f64, variance: f64) -> ParameterStep<N> {

@@ -26,7 +26,7 @@
 //!
 //! **Outliers.** An innovation beyond a limit of a few sigma changes the estimate as if it were at that limit (P. J.
 //! Huber, *Robust Statistics*, 1981, section 7.3); the gain in the equations above is then the reduced gain that was
-//! applied. The innovation variance uses the unclipped innovation, so it follows a lasting change of the noise.
+//! applied. The innovation variance uses the unclipped innovation, so it follows a lasting change in the noise.
 //!
 //! The innovation variance sigma^2 is the mean of `eps^2/(1 + h' Sigma h)`, whose terms each have the expected value
 //! sigma^2.

@@ -52,7 +52,7 @@ pub fn divide_from(d: &[f64], x: &mut [f64], from: usize) {
     }
 }
 
-/// As [`divide_from`] for a low order, with the past outputs in registers.
+/// Like [`divide_from`] for a low order, with the past outputs in registers.
 fn divide_in_registers<const N: usize>(d: [f64; N], x: &mut [f64], from: usize) {
     let mut past: [f64; N] = core::array::from_fn(|i| from.checked_sub(i + 1).map_or(0.0, |t| x[t]));
     for value in &mut x[from..] {
@@ -239,7 +239,7 @@ mod tests {
         for n in 0..=d.len() {
             let mut whole = wave(200);
             divide_in_place(&d[..n], &mut whole);
-            // Also for a cut after one sample: the missing past output of the filter is zero.
+            // This also holds for a cut after one sample, where the missing past output of the filter is zero.
             for cut in [1, 3, 64] {
                 let mut parts = wave(200);
                 divide_in_place(&d[..n], &mut parts[..cut]);

@@ -67,9 +67,9 @@
 //! |---|---|
 //! | [`rls`], [`rpem`] | recursive least squares and the recursive prediction-error method |
 //! | [`adaptive`] | gains in a basis of physical dynamics, with its own noise model, a level of u, and a test for changes |
-//! | [`bounds`] | limits of a number |
+//! | [`bounds`] | limiting of a number to an interval |
 //! | [`predictor`], [`shape`], [`further_input`] | one-step predictor of the general model with its gradient; orders of the model; responses to further inputs |
-//! | [`adaptation`], [`covariance`], [`window`] | from gradient to step: rules of forgetting; P with protection against windup; a rectangular window |
+//! | [`adaptation`], [`covariance`], [`window`] | from gradient to step: forgetting rules; P with protection against windup; a rectangular window |
 //! | [`ud_covariance`] | covariance matrix in the factored form `U D U'` |
 //! | [`error_bars`], [`sensitivities`], [`innovation_variance`] | covariance of the estimate for any gain; errors in the filters; sigma^2 |
 //! | [`recursion`] | result of a step; polynomials that are kept stable |

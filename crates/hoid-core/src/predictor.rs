@@ -95,7 +95,7 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
 }
 
 impl<S: Shape, const N: usize, const L: usize, I: FurtherInputs<N>> Predictor<S, N, L, I> {
-    /// As [`Predictor::new`], with further inputs.
+    /// Like [`Predictor::new`], with further inputs.
     pub fn with_further_inputs(shape: S, regressor: Regressor, further: I) -> Option<Self> {
         let inputs = shape.nb().max(shape.nd() + 1).max(shape.nc() + shape.nf());
         let parameters = shape.parameter_count() + further.parameter_count();

@@ -31,8 +31,8 @@ crate::state!([S, const N: usize, A: crate::state::State, B: crate::state::State
 
 impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<S, N, A, B> {
     /// Starts from theta `[a.., b..]` with zeros before the first sample. Returns `None` if there is no parameter, if
-    /// there are more than N parameters, if C, D or F has parameters, or if the rule of forgetting needs the innovation
-    /// variance but `bars` do not estimate it.
+    /// there are more than N parameters, if C, D or F has parameters, or if the forgetting rule needs the innovation
+    /// variance but `bars` does not estimate it.
     pub fn new(shape: S, theta: [f64; N], adaptation: A, bars: B) -> Option<Self> {
         let linear = (shape.nc(), shape.nd(), shape.nf()) == (0, 0, 0);
         let known = bars.variance().is_some() || !adaptation.needs_innovation_variance();

@@ -37,7 +37,7 @@ crate::state!([S, const N: usize, const K: usize, A: crate::state::State, B: cra
 
 impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropagation<N, K>> Rpem<S, N, K, A, B> {
     /// Starts from `theta = [a.. b.. c.. d.. f..]` with filters at rest. Returns `None` if the shape exceeds N or K, if
-    /// theta is not stable, or if the rule of forgetting needs the innovation variance but `bars` do not estimate it.
+    /// theta is not stable, or if the forgetting rule needs the innovation variance but `bars` does not estimate it.
     pub fn new(
         shape: S,
         regressor: Regressor,
@@ -53,8 +53,8 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
 impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropagation<N, K>, I: FurtherInputs<N>>
     Rpem<S, N, K, A, B, I>
 {
-    /// As [`Rpem::new`], with further inputs, whose coefficients follow those of `[a.. b.. c.. d.. f..]`. The error
-    /// bars of a model with further inputs have no filter errors: also `None` if K is not zero.
+    /// Like [`Rpem::new`], with further inputs, whose coefficients follow those of `[a.. b.. c.. d.. f..]`. The error
+    /// bars of a model with further inputs have no filter errors, so the result is also `None` if K is not zero.
     pub fn with_further_inputs(
         shape: S,
         further: I,

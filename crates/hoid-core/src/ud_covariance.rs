@@ -1,6 +1,6 @@
 //! Covariance matrix in factored form: `P = U D U'`, U unit upper triangular, D diagonal.
 //!
-//! P stays symmetric and positive semidefinite despite rounding as long as D stays nonnegative. The rules of forgetting
+//! P stays symmetric and positive semidefinite despite rounding as long as D stays nonnegative. The forgetting rules
 //! need three operations:
 //!
 //! - **measurement** with the regressor psi and the variance R: `g = P psi/(R + psi' P psi)`,
@@ -124,7 +124,7 @@ impl<const N: usize> UdCovariance<N> {
         f.iter().zip(&v).map(|(f, v)| f * v).sum()
     }
 
-    /// As [`UdCovariance::measurement_update`], given the result of [`UdCovariance::projections`] for psi.
+    /// Like [`UdCovariance::measurement_update`], given the result of [`UdCovariance::projections`] for psi.
     #[inline(always)]
     pub fn update_with_projections(&mut self, (f, v): ([f64; N], [f64; N]), variance: f64) -> [f64; N] {
         let grown = core::array::from_fn(|j| self.u[j][j]);

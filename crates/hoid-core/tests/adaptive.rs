@@ -118,7 +118,7 @@ fn response(basis: &Basis, gains: [f64; GAIN_COUNT], omega: f64) -> [f64; 2] {
     [0, 1].map(|part| (0..GAIN_COUNT).map(|i| gains[i] * h[i][part]).sum())
 }
 
-/// Returns the real and imaginary part of the estimate at a frequency, with their variances.
+/// Returns the real and imaginary parts of the estimate at a frequency, with their variances.
 fn estimate(filter: &AdaptiveFilter<Vec<f64>>, omega: f64) -> ([f64; 2], [f64; 2]) {
     let (value, by) = filter.response_with_derivatives(omega);
     let c = filter.state_covariance();
@@ -156,7 +156,7 @@ fn bands_cover_the_truth_and_narrow_with_time() {
             }
         }
     }
-    // A share of 192 dependent values has a standard error of 3 to 4 %.
+    // A share of 192 correlated values has a standard error of 3 to 4 %.
     let share = inside / all;
     assert!((0.87..=1.0).contains(&share), "{share}");
     // The errors after 100 s are compared with those after 10 s, i.e. with ten times the data.
@@ -191,8 +191,8 @@ fn steep_remnant_is_estimated_as_precisely_as_a_flat_one() {
             let [e, u] = person.sample(OPERATOR_GAINS, 0.0);
             filter.step(e, u + v);
             if k == 1000 {
-                // The innovations have .1 to 60 thousandths of the power of u; their scale is found immediately from
-                // the data.
+                // The innovation variance is .1 to 60 thousandths of the power of u; its scale is found immediately
+                // from the data.
                 let ratio = filter.variance() / variance;
                 assert!((0.7..1.5).contains(&ratio), "{poles} poles: {ratio}");
             }
@@ -205,7 +205,7 @@ fn steep_remnant_is_estimated_as_precisely_as_a_flat_one() {
         }
         precision.push((variance[0] + variance[1]).sqrt());
     }
-    // The same power, with less of it in the band of the response.
+    // Both remnants have the same power; the steep one has less of it in the band of the response.
     assert!(precision[1] < 2.0 * precision[0], "{precision:?}");
 }
 
@@ -328,7 +328,7 @@ fn change_is_tracked_and_a_larger_remnant_is_no_change() {
         errors += (value[0] - truth[0]).hypot(value[1] - truth[1]) / truth[0].hypot(truth[1]) / 4.0;
     }
     assert!(found >= 3, "{found} of 4");
-    // The errors 30 s after the change; one of them has a standard error of .13 to .19.
+    // This is the mean error 30 s after the change; each single error has a standard error of .13 to .19.
     assert!(errors < 0.15, "{errors}");
 
     let mut alarms = 0;
@@ -554,7 +554,7 @@ fn initial_estimate_is_used() {
         response(&basis(default_operator()), OPERATOR_GAINS, 2.0),
     );
     assert!((value[0] - truth[0]).hypot(value[1] - truth[1]) < 1e-9);
-    // Compared with a filter without an initial estimate, over ten seconds.
+    // The estimate is compared with that of a filter without an initial estimate, over ten seconds.
     let (mut person, mut other) = (Person::new(3), filter(1e9));
     let mut errors = [0.0; 2];
     for k in 0..500 {

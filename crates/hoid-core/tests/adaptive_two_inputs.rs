@@ -101,7 +101,7 @@ impl Person {
     }
 }
 
-/// Returns the real and imaginary part of a response at a frequency, with their variances.
+/// Returns the real and imaginary parts of a response at a frequency, with their variances.
 fn estimate(filter: &Filter, input: usize, omega: f64) -> ([f64; 2], [f64; 2]) {
     let (value, by) = filter.response_of_with_derivatives(input, omega);
     let c = filter.state_covariance();
@@ -168,8 +168,8 @@ fn bands_of_both_responses_cover_the_truth_before_and_after_a_change() {
     let each = count / 2.0;
     let inside = inside.map(|of| of.map(|n| n / each));
     let rms = squares.map(|of| of.map(|s| (s / each).sqrt()));
-    // 16 runs of 6 correlated values each: the standard error of a share is about .04. The errors include the drift that
-    // people have and these signals do not have, so they are too large here.
+    // 16 runs of 6 correlated values each: the standard error of a share is about .04. The standard errors allow for
+    // the drift of people, which these signals do not have, so they are too large here.
     assert!(inside.as_flattened().iter().all(|share| *share > 0.9), "{inside:?}");
     assert!(rms.as_flattened().iter().all(|rms| *rms < 1.0), "{rms:?}");
     // The first seconds after a change hardly distinguish the inputs, so in some runs both are named at first.
@@ -266,7 +266,7 @@ fn estimate_without_drift_matches_least_squares() {
             let gains = std::array::from_fn(|i| expected[input * GAIN_COUNT + i]);
             let truth = person.response(input, &gains, omega);
             for part in 0..2 {
-                // A few per cent of the samples are used differently: whitening, and the start.
+                // A few per cent of the samples are used differently because of the whitening and the start.
                 let distance = (value[part] - truth[part]).abs() / variance[part].sqrt();
                 assert!(distance < 0.35, "{input} {omega} {distance}");
             }

@@ -156,7 +156,7 @@ fn infinite_memory_gives_the_least_squares_estimate() {
         StablePolynomials::Predictor,
         [0.0; 5],
         covariance::<5>(prior, Forgetting::Exponential { lambda: [1.0; 5] }),
-        // Without a limit on innovations, which the first samples of an unknown model would exceed.
+        // There is no limit on innovations, since the first samples of an unknown model would exceed it.
         ErrorBars::<5, 0>::new(&diagonal(prior), InnovationVariance::new(0.0, 0.0, 1.0), f64::INFINITY),
     )
     .unwrap();

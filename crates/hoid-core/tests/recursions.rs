@@ -77,7 +77,7 @@ fn factored_covariance_matches_the_plain_form() {
             let gain = plain.update(&forgetting, recursion.psi(), limited, variance);
             if !step.shortened {
                 for i in 0..5 {
-                    // In units of the standard error, so parameters of any size have the same weight.
+                    // The difference is in units of the standard error, so parameters of any size have the same weight.
                     let difference = recursion.theta()[i] - before[i] - gain[i] * limited;
                     worst_gain = worst_gain.max(difference.abs() / plain.p[i][i].sqrt());
                 }

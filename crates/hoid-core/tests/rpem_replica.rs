@@ -119,7 +119,7 @@ fn cascade_differs_from_the_direct_form() {
 }
 
 /// Effect of the order of the two filters while theta changes, from the page on recursive identification: with one pole
-/// and one zero the difference of the cascade and the direct form is
+/// and one zero the difference between the cascade and the direct form is
 /// `Delta(t) = -f(t) Delta(t-1) + [f(t) d(t-1) - d(t) f(t-1)] z(t-2)`, `z = x/F`.
 #[test]
 fn filter_order_matters_only_while_theta_changes() {

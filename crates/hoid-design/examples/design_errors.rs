@@ -1,10 +1,11 @@
-//! Errors that `hoid design` predicts against the scatter of simulated experiments (`tests/common/simulated.rs`).
+//! Compares the errors that `hoid design` predicts with the scatter of simulated experiments
+//! (`tests/common/simulated.rs`).
 //!
 //! ```sh
 //! cargo xtask slow design-errors [EXPERIMENTS] [SEED] [IDENTIFIED]
 //! ```
 //!
-//! Where people see the target, so many experiments (none by default) are also identified as `hoid identify` does it:
+//! If the target is displayed, `IDENTIFIED` experiments (none by default) are also identified as by `hoid identify`:
 //! both responses by prediction error and at the lines, with the forms of the design and without a prior.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
@@ -22,7 +23,7 @@ fn main() {
     let number = |i: usize, otherwise: u64| env::args().nth(i).map_or(otherwise, |text| text.parse().unwrap());
     let (experiments, seed, identified) = (number(1, 200), number(2, 1), number(3, 0));
     let (mut within, mut all) = (0, 0);
-    // Other remnants in each case.
+    // Each case has a different realisation of the remnant.
     for (case, seed) in CASES.iter().zip((seed..).step_by(1000)) {
         let found = case.check_errors(experiments, seed);
         let held = found.iter().filter(|q| is_within(q)).count();

@@ -6,7 +6,7 @@
 //! maximises `l + log tau` (Y. Chung, S. Rabe-Hesketh and I.-H. Choi, *Stat. Med.* 32 (2013) 4071-4089), which is never
 //! zero. The pooled estimate for a person (B. Efron and C. Morris, *J. Am. Stat. Assoc.* 70 (1975) 311-319) is
 //!
-//! `B_i mu + (1 - B_i) y_i`, `B_i = v_i/(v_i + tau^2)`, with the variance `(1 - B_i) v_i + B_i^2 var(mu)`:
+//! `B_i mu + (1 - B_i) y_i`, `B_i = v_i/(v_i + tau^2)`, with the variance `(1 - B_i) v_i + B_i^2 var(mu)`.
 //!
 //! **B is the shrinkage**, which is 1 for a person without information. The variance ignores that tau^2 is itself an
 //! estimate. A new person has the mean `mu` and the variance `tau^2 + var(mu)`, which form the prior.
@@ -322,7 +322,7 @@ mod tests {
             all / own
         );
         assert!(all < 0.5 * own, "{all} {own}");
-        // Of 8000; people of one experiment share mu and tau.
+        // The coverage is over 8000 intervals; the people of one experiment share the estimates of mu and tau.
         assert!((0.93..0.97).contains(&held), "{held}");
     }
 
@@ -340,7 +340,8 @@ mod tests {
             averaged_over: Vec::new(),
         };
         let prior: OperatorPrior = "tau_e=0.2:0.3".parse().unwrap();
-        // Half prior: the data are as far on the other side, with twice the variance.
+        // With a prior share of one half, the data are as far from the estimate as the prior, on the other side, and
+        // have twice the variance.
         let half = observation_without_prior(&parameter(0.3, 0.5), &prior).unwrap();
         assert!((half.value - (0.3_f64.ln() + (0.3_f64 / 0.2).ln())).abs() < 1e-12);
         assert!((half.variance - 0.02).abs() < 1e-12);

@@ -1,13 +1,15 @@
-//! Do intervals of 95 % hold the difference in 95 % of experiments, and is there one false finding in twenty?
+//! Checks that 95 % confidence intervals contain the true difference in 95 % of experiments, and that one test in
+//! twenty has a false finding if there is no difference.
 //!
-//! Virtual people have a true difference each, `N(delta, tau^2)`, and an estimate of it with an error whose size is
-//! their own, .1 to .5. The error is reported as it is, or estimated as the scatter of five runs is, `v chi^2_4/4`. Of
-//! 6000 experiments the standard error of a share of .95 is .0028. A test of no difference finds one exactly where the
-//! interval of the same people, moved by delta, does not hold zero: 5 +- 1 % false findings are 94 to 96 % of the
-//! intervals.
+//! Each virtual person has a true difference, drawn from `N(delta, tau^2)`, and an estimate of it with a standard error
+//! between .1 and .5. The variance v of the estimate is known exactly, or estimated as from the scatter of five runs,
+//! `v chi^2_4/4`. With 6000 experiments, the standard error of a share of .95 is .0028. A test has a false finding
+//! exactly if the interval of the same people, shifted by delta, does not contain zero, so 5 +- 1 % false findings
+//! correspond to a coverage of 94 to 96 %.
 //!
-//! Where people do not differ beyond errors of so different size, intervals of few of them hold the difference too
-//! often, up to 98 % (so do those of the t test without weights): there they are bounded from below.
+//! If people differ only by estimation errors of very different sizes, the intervals for few people contain the
+//! difference too often, in up to 98 % of cases (as do those of the unweighted t test). In these cases only a lower
+//! limit is checked.
 #![allow(clippy::unwrap_used)]
 
 use hoid_design::compare::{Observation, Weights, meta_mean, meta_regression};
@@ -21,7 +23,7 @@ fn normal_deviate(rng: &mut ChaCha8Rng) -> f64 {
     StandardNormal.sample(rng)
 }
 
-/// An estimate of a person.
+/// Returns an estimate for one person.
 fn person(rng: &mut ChaCha8Rng, share: f64, mean: f64, tau: f64, estimated: bool) -> Observation {
     let error = 0.1 + 0.4 * share;
     let value = mean + tau * normal_deviate(rng) + error * normal_deviate(rng);
@@ -36,7 +38,7 @@ fn person(rng: &mut ChaCha8Rng, share: f64, mean: f64, tau: f64, estimated: bool
     }
 }
 
-/// Share of intervals that hold the difference.
+/// Returns the share of intervals that contain the difference.
 fn paired_coverage(n: usize, tau: f64, estimated: bool, weights: Weights) -> f64 {
     let mut rng = ChaCha8Rng::seed_from_u64(53 + n as u64);
     let mut held = 0;
@@ -64,7 +66,7 @@ fn within_person_intervals_have_nominal_coverage() {
     }
 }
 
-/// Why the weights are not those of the restricted likelihood.
+/// The reason why the weights do not use the tau^2 of the restricted likelihood.
 #[test]
 fn restricted_likelihood_undercovers_for_three_people() {
     let held = paired_coverage(3, 0.4, false, Weights::Restricted);

@@ -1,7 +1,8 @@
-//! Errors that were predicted against the scatter of simulated experiments: a sample of `cargo xtask slow
+//! Compares predicted errors with the scatter of simulated experiments, for a sample of the cases of `cargo xtask slow
 //! design-errors`.
 //!
-//! Of 200 experiments the standard deviation of a parameter has an error of 5 %: 15 % are three of them.
+//! With 200 experiments, the relative standard error of a standard deviation is 5 %; the limit of 15 % is three times
+//! this value.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 #[path = "common/simulated.rs"]

@@ -7,7 +7,7 @@ use semihosting::{fs::File, io::Read, println, process};
 use crate::run;
 
 unsafe extern "C" {
-    /// Upper and lower end of the stack, defined by the linker.
+    /// Upper and lower ends of the stack, defined by the linker.
     static _stack_start: u32;
     static _stack_end: u32;
 }

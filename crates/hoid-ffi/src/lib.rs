@@ -13,7 +13,7 @@
 //!   the affected tracker returns [`HOID_BROKEN`], since the state of the tracker may be inconsistent.
 //! - **A null pointer is an error**, not a crash, and nothing is written to an array that is too short.
 //!
-//! Names, order and units are the same as in Rust and Python.
+//! The names, their order and the units are the same as in Rust and Python.
 //!
 //! | module | contents |
 //! |---|---|

@@ -151,7 +151,7 @@ impl Session {
         ])
     }
 
-    /// Returns gain and phase at a frequency in rad/s.
+    /// Returns the gain and the phase at a frequency in rad/s.
     pub fn response(&self, omega_rad_s: f64) -> Result<Vec<HoidEstimate>, Failure> {
         if !(omega_rad_s > 0.0 && omega_rad_s.is_finite()) {
             return Err(Failure::bad_option(format!(

@@ -18,7 +18,7 @@ pub struct HoidOutcome {
     pub held: i32,
     /// 1 if the step of the estimate was shortened to ensure stability or to respect a bound.
     pub shortened: i32,
-    /// 1 if a change of the person was declared at this sample.
+    /// 1 if a change in the person was declared at this sample.
     pub changed: i32,
 }
 
@@ -64,7 +64,7 @@ pub struct HoidShift {
     pub after: f64,
     /// Standard error of the value after the change; NaN if there is none.
     pub after_standard_error: f64,
-    /// Change divided by its standard error; for the remnant, the change of the logarithm divided by its standard
+    /// Change divided by its standard error; for the remnant, the change in the logarithm divided by its standard
     /// error.
     pub z: f64,
 }
@@ -72,7 +72,7 @@ pub struct HoidShift {
 /// Number of quantities in a change.
 pub const HOID_SHIFTS: usize = 6;
 
-/// Declared change of the person.
+/// Declared change in the person.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HoidChange {

@@ -190,7 +190,7 @@ fn c_example_is_clean_under_sanitizers() {
         &["rpem", "0.01", "{\"nk\": 29, \"nd\": 1}", "1000"],
         &input,
     ));
-    // A failed example leaves no other files than a successful one.
+    // A refused method gives exit status 1 and a message, without a report from the sanitizer.
     let refused = run(&program, &["kalman", "0.01"], "");
     let message = String::from_utf8_lossy(&refused.stderr).into_owned();
     assert_eq!(refused.status.code(), Some(1));

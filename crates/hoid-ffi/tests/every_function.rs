@@ -1,4 +1,4 @@
-//! Calls every function that takes a pointer, as a C program would. Only few samples are used, so that Miri can
+//! Calls every function that takes a pointer, as a C program would. Only a few samples are used, so that Miri can
 //! interpret the program (`cargo xtask miri`) and check each read and write of memory.
 #![cfg_attr(miri, allow(stable_features))]
 #![cfg_attr(miri, feature(c_variadic))]

@@ -27,7 +27,7 @@ impl Constraint {
     }
 }
 
-/// A guess theta* of one parameter: the loss grows by `weight (theta - theta*)^2`.
+/// A guess theta* of one parameter: the loss increases by `weight (theta - theta*)^2`.
 ///
 /// A weight of `sigma^2 / (N s^2)` corresponds to a prior standard deviation s, where sigma^2 is the innovation
 /// variance and N the number of residuals.

@@ -11,7 +11,7 @@
 //! `d omega_c = -(d ln|L|/d theta) / (d ln|L|/d omega)`, `d phi_m = d arg L/d theta + (d arg L/d omega) d omega_c`.
 //!
 //! The effect on the gain margin follows in the same way from the condition `arg L = -180 deg`, with the roles of phase
-//! and gain exchanged. A searched delay also changes the phase by `-omega d tau` (`searched_delay.rs`).
+//! and gain exchanged. A delay found by a search also changes the phase by `-omega d tau` (`searched_delay.rs`).
 
 use hoid_model::{
     Complex64, margins::Margins, margins::margins, polynomial, polynomial_model::monic, uncertainty::Estimate,
@@ -27,7 +27,7 @@ pub struct Root {
     pub polynomial: char,
     /// Value of the root.
     pub value: Complex64,
-    /// Standard errors of the real and the imaginary part; `None` without a covariance or at a multiple root.
+    /// Standard errors of the real and imaginary parts; `None` without a covariance or at a multiple root.
     pub standard_error: Option<(f64, f64)>,
 }
 
@@ -94,7 +94,7 @@ impl Fit {
         all
     }
 
-    /// Returns the standard errors of the real and imaginary part of the root `z` of `p`; `None` if they are unknown.
+    /// Returns the standard errors of the real and imaginary parts of the root `z` of `p`; `None` if they are unknown.
     /// The coefficients of `p` are in theta from index `at`; `leading` is true if they include the leading coefficient.
     fn root_error(&self, p: &[f64], z: Complex64, at: usize, leading: bool) -> Option<(f64, f64)> {
         let covariance = self.covariance()?;
@@ -117,7 +117,7 @@ impl Fit {
     }
 
     /// Returns crossover frequencies and margins, with standard errors, of the open loop of the model and a controlled
-    /// element with the given frequency response. Crossings are searched in the given range.
+    /// element with the given frequency response. Crossings are searched for in the given range.
     pub fn margins(&self, controlled_element: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) -> MarginEstimates {
         let open_loop = |omega: f64| self.model().response(omega) * controlled_element(omega);
         let found = margins(open_loop, range_rad_s);

@@ -89,7 +89,7 @@ impl Estimator {
         }
     }
 
-    /// Validates structure, orders and options, also in combination.
+    /// Validates the structure, the orders and the options, each alone and in combination.
     ///
     /// # Errors
     /// [`IdentError`] describes the problem.

@@ -37,7 +37,7 @@ pub struct Fit {
     pub(crate) instrumented: bool,
     /// For a grey box, the physical parameters from which theta was computed.
     pub(crate) physical: Option<Box<Physical>>,
-    /// Variance of the delay and its effect on theta, if nk was searched.
+    /// Variance of the delay and its effect on theta, if nk was found by a search.
     pub(crate) searched_delay: Option<SearchedDelay>,
 }
 
@@ -54,7 +54,7 @@ pub(crate) struct Physical {
     pub remnant: Option<RemnantEstimate>,
 }
 
-/// Variance of a searched delay, and derivative of theta with respect to the delay.
+/// Variance of a delay found by a search, and the derivative of theta with respect to the delay.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct SearchedDelay {
     /// Variance of the delay tau, s^2.
@@ -95,8 +95,8 @@ impl Fit {
     }
 
     /// Returns the covariance of theta by rows: `sigma^2 (psi' psi)^-1` with the initial states eliminated, plus the
-    /// contribution of a searched delay if the model represents an operator (`searched_delay.rs`). `None` for an exact
-    /// fit, whose residuals carry no information about the noise.
+    /// contribution of a delay found by a search if the model represents an operator (`searched_delay.rs`). `None` for
+    /// an exact fit, whose residuals carry no information about the noise.
     pub fn covariance(&self) -> Option<&[f64]> {
         self.covariance.as_deref()
     }
@@ -200,7 +200,7 @@ impl Fit {
 
     /// Young's criterion `ln(V / var u) + ln( (1/p) sum_i var theta_i / theta_i^2 )` over the free coefficients of A, B
     /// and F (P. C. Young, *Recursive Estimation and Time-Series Analysis*, 2011, section 6.7). A more negative value
-    /// means a closer fit with better determined coefficients. `None` without standard errors or if a coefficient is
+    /// means a closer fit with better-determined coefficients. `None` without standard errors or if a coefficient is
     /// zero.
     pub fn yic(&self) -> Option<f64> {
         let relative: Option<Vec<f64>> = self
@@ -399,8 +399,8 @@ fn subtract_from_output(record: &Record, mut errors: Series) -> Series {
     errors
 }
 
-/// Returns orders and theta of the output-error model `u = B/(A F) q^-nk e + eps` that responds to e as `model` does.
-/// The residual of this output-error model is the simulation error.
+/// Returns the orders and theta of the output-error model `u = B/(A F) q^-nk e + eps` that responds to e as `model`
+/// does. The residual of this output-error model is the simulation error.
 fn output_error_form(model: &PolynomialModel) -> (Orders, Vec<f64>) {
     let orders = model.orders();
     let den = product(&monic(model.a()), &monic(model.f()));

@@ -6,8 +6,8 @@ use crate::{IdentError, linalg::vectors::dot};
 const MIN_UNEXPLAINED_SHARE: f64 = 1e-9;
 
 /// Returns an error for an input that is constant or a linear combination of the previous inputs, such as r = e + y if
-/// all three signals of a loop are inputs. `inputs` are the names and the values, from which the mean is subtracted; the
-/// first input is the error, which may be constant.
+/// all three signals of a loop are inputs. `inputs` are the names and the values, from which the mean is subtracted;
+/// the first input is the error, which may be constant.
 ///
 /// # Errors
 /// [`IdentError::BadOption`] with the name of the input.

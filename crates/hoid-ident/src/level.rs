@@ -118,7 +118,7 @@ mod tests {
 
     #[test]
     fn offset_of_u_is_found_without_bias() {
-        // Sum over the runs of the squared errors of c, in standard errors.
+        // The squared errors of c, in standard errors, are summed over the runs.
         let (mut squares, runs) = (0.0, 12);
         for k in 0..runs {
             let record = simulated_record(k);
@@ -139,7 +139,7 @@ mod tests {
 
     #[test]
     fn level_equals_the_regression_constant() {
-        // Reference: ARX is linear, so a column of ones is added to the regressors.
+        // The reference is a regression with a column of ones, since ARX is linear.
         let record = shifted_record(&simulated_record(40), 0.0, 0.03);
         let fit = fit_without_level(Structure::Arx, &record);
         let (e, u) = (record.input(), record.output());

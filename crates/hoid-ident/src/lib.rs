@@ -19,7 +19,7 @@
 //!
 //! and theta minimises `V = (1/N) sum eps(t, theta)^2`: the prediction error method (L. Ljung, *System Identification*,
 //! 1999, ch. 7). The estimate is consistent if the structure contains the true dynamics, also in a closed loop with a
-//! delay, and attains the Cramér-Rao bound for normally distributed innovations. Its covariance is
+//! delay, and asymptotically attains the Cramér-Rao bound for normally distributed innovations. Its covariance is
 //! `sigma^2 (psi' psi)^-1` with `psi = -d eps/d theta`. The unknown initial states of a record enter eps linearly and
 //! are eliminated exactly for each theta. ARX models are linear in theta and solved in one step; all other structures
 //! are fitted by damped Gauss-Newton steps from several starts.
@@ -76,7 +76,7 @@
 //! | `multistart` | searches from several starts |
 //! | `initial_guess` | starting values of a search |
 //! | `pem` | bounds, priors, robust loss, focus; fits of one record, or of many records in parallel lanes |
-//! | `searched_delay` | contribution of a searched nk to the error bars |
+//! | `searched_delay` | contribution of the search for nk to the error bars |
 
 mod assembled_fit;
 mod constraint;

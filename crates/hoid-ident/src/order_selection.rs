@@ -2,9 +2,9 @@
 //!
 //! Every combination of the given ranges is fitted on the same samples: the residuals of all candidates start at the
 //! first sample that is possible for every candidate. A criterion selects the best candidate. The loss is a valid
-//! criterion only if the candidates differ only in the delay; BIC also compares different numbers of parameters. The
+//! criterion only if the candidates differ only in the delay; BIC can also compare different numbers of parameters. The
 //! selected model is fitted again on all samples available for its own orders, and its error bars include the
-//! uncertainty of a searched delay (`searched_delay.rs`).
+//! uncertainty of a delay found by the search (`searched_delay.rs`).
 
 use std::{collections::BTreeMap, fmt, ops::RangeInclusive};
 
@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use crate::{Estimator, Fit, IdentError, SearchOptions, criterion::first_residual};
 
-/// Maximum number of candidates in a search; the fit of each candidate takes some milliseconds.
+/// Maximum number of candidates in a search; the fit of each candidate takes a few milliseconds.
 pub const MAX_CANDIDATES: usize = 100_000;
 
 /// Ranges of the orders and of the delay.
@@ -302,7 +302,7 @@ pub struct Choice {
 /// to 0.6 s and nd over 1 to 4, and BIC selects among the candidates.
 ///
 /// # Errors
-/// As [`choose_orders`]; [`IdentError::NoRecords`] without a record.
+/// Same as [`choose_orders`]; [`IdentError::NoRecords`] without a record.
 pub fn identify_box_jenkins(records: &[Record]) -> Result<Choice, IdentError> {
     let structure = Structure::BoxJenkins;
     let first = records.first().ok_or(IdentError::NoRecords)?;
@@ -325,8 +325,8 @@ pub fn choose_orders(
     choose_orders_with(template, ranges, criterion, records, &|| {})
 }
 
-/// Like [`choose_orders`], and calls `each` after every candidate, possibly from other threads, to report the progress
-/// of a long search.
+/// Like [`choose_orders`], but also calls `each` after every candidate, possibly from other threads, to report the
+/// progress of a long search.
 ///
 /// # Errors
 /// Same as [`choose_orders`].

@@ -1,9 +1,10 @@
-//! Contribution of a searched delay to the error bars of a fit.
+//! Contribution of a delay found by a search to the error bars of a fit.
 //!
-//! An nk that is searched for is estimated from the data, as theta is, and theta depends on it. The residual also has a
-//! derivative with respect to the delay tau. With the filtered response of the model `x = (D/C) w = sum_j b_j psi_bj`,
-//! this derivative is computed by central differences, `d(t) = -d eps/d tau = (x(t-1) - x(t+1))/(2 Ts)`. With `G = psi'
-//! psi` the estimate of theta depends on the delay with the slope
+//! If nk is found by a search, it is estimated from the data like theta, and theta depends on it. The residual also has
+//! a derivative with respect to the delay tau. With the filtered response of the model
+//! `x = (D/C) w = sum_j b_j psi_bj`, this derivative is computed by central differences,
+//! `d(t) = -d eps/d tau = (x(t-1) - x(t+1))/(2 Ts)`. With `G = psi' psi` the estimate of theta depends on the delay
+//! with the slope
 //!
 //! `s = d theta/d tau = -G^-1 psi' d`
 //!
@@ -150,7 +151,8 @@ mod tests {
 
     #[test]
     fn slope_of_theta_matches_neighbouring_delays() {
-        // Reference: the fits with one sample less and one sample more of delay, a chord of 20 ms.
+        // The reference is the chord between the fits with a delay one sample shorter and one sample longer, 20 ms
+        // apart.
         let record = run(0);
         let fit = search_delay(&record).fit;
         let slope = &fit.searched_delay.as_ref().unwrap().slope;
@@ -203,7 +205,7 @@ mod tests {
             let phase = fit.frequency_response(&[omega])[0].phase_deg;
             let off = (Complex64::from_polar(1.0, phase.value.to_radians()) / response).arg();
             z2[2] += z(off.to_degrees(), 0.0, phase.standard_error);
-            // The standard error for a known nk: the contribution of the delay is removed.
+            // For the standard error with a known nk, the contribution of the delay is removed.
             let delay = fit.searched_delay.clone().unwrap();
             let p = delay.slope.len();
             let mut bare = fit.clone();
@@ -216,7 +218,7 @@ mod tests {
             without += z(bare.value, truth.omega_nm_rad_s, bare.standard_error);
         }
         let n = runs as f64;
-        // The mean squares of 40 standard normal numbers are 1 ± .22.
+        // The mean square of 40 standard normal numbers is 1 with a standard error of 0.22.
         assert!(z2.iter().all(|s| (0.4..1.6).contains(&(s / n))), "{z2:?}");
         assert!(without / n > 1.5, "{without}");
     }
@@ -241,7 +243,7 @@ mod tests {
 
     #[test]
     fn delay_variance_is_limited_by_the_search_range() {
-        // u does not depend on e: the delay carries no information.
+        // With this innovation variance the data carry no information about the delay.
         let record = run(2);
         let delays = 3;
         let fit = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(29))

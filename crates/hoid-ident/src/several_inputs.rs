@@ -58,7 +58,7 @@ use crate::{
 /// Maximum number of coefficients that A and each B of the high-order ARX model have in addition to the orders of the
 /// fitted model.
 const MAX_ADDITIONAL_ORDER: usize = 12;
-/// Relative increase of the diagonal of the normal matrix in the regression for the high-order ARX model.
+/// Relative increase in the diagonal of the normal matrix in the regression for the high-order ARX model.
 const RIDGE_FACTOR: f64 = 1e-8;
 /// Order of the autoregression that estimates the innovations for the start of C.
 const LONG_AR_ORDER: usize = 24;
@@ -151,7 +151,7 @@ impl SeveralInputs {
         }
     }
 
-    /// Validates structure, orders and inputs, also in combination.
+    /// Validates the structure, the orders and the inputs, each alone and in combination.
     ///
     /// # Errors
     /// [`IdentError`] describes the problem.
@@ -215,7 +215,7 @@ impl SeveralInputs {
     }
 
     /// Fits an ARX model of the orders of `criterion` by ridge regression. This gives a frequency response even if the
-    /// records determine only few combinations of the coefficients. `None` if the normal equations are singular.
+    /// records determine only a few combinations of the coefficients. `None` if the normal equations are singular.
     pub(crate) fn fit_ridge(
         &self,
         criterion: &Criterion<'_>,
@@ -530,7 +530,7 @@ fn channel_or_input<'r>(record: &'r Record, name: &str, first: &str) -> Result<&
 }
 
 impl SeveralInputsFit {
-    /// Returns names and estimates of all coefficients, for example `a1`, `b0[e]`, `f1[r]`, `c1`, `d1`.
+    /// Returns the names and estimates of all coefficients, for example `a1`, `b0[e]`, `f1[r]`, `c1`, `d1`.
     pub fn parameters(&self) -> Vec<(String, Estimate)> {
         let p = self.theta.len();
         let estimate = |i: usize| match &self.covariance {
@@ -567,8 +567,8 @@ impl SeveralInputsFit {
         [a, from..from + own.nb, from + own.nb..from + own.nb + own.nf]
     }
 
-    /// Returns gain and phase of `B_i/(A F_i) q^-nk_i`, the response of u to the input with this index, at frequencies
-    /// in rad/s.
+    /// Returns the gain and phase of `B_i/(A F_i) q^-nk_i`, the response of u to the input with this index, at
+    /// frequencies in rad/s.
     pub fn frequency_response(&self, input: usize, omega_rad_s: &[f64]) -> Vec<ResponsePoint> {
         let [a, b, f] = self.coefficient_ranges(input);
         let nk = self.model.inputs[input].1.nk;

@@ -41,9 +41,9 @@ pub fn noise_option<E: 'static>(
     BatchOption::new(setting, set)
 }
 
-/// Returns the option for a change of the operator; this option also determines which estimator is used.
+/// Returns the option for a change in the operator; this option also determines which estimator is used.
 pub fn change_option<E: 'static>() -> BatchOption<E> {
-    let help = "Change of the operator: none, or one sigmoid change of its gains (hoid identify then rejects \
+    let help = "Change in the operator: none, or one sigmoid change in its gains (hoid identify then rejects \
                 --figure, --validate, --horizon and --report)";
     let setting = Setting::new("change", Kind::Choice(&["none", "sigmoid"]), help).default("none");
     BatchOption::new(setting, |_, _, _| Ok(()))
@@ -51,7 +51,7 @@ pub fn change_option<E: 'static>() -> BatchOption<E> {
 
 /// Returns the option for the form of an operator; the text `auto` means `None`.
 pub fn form_option<E: 'static>(set: fn(&mut E, Option<Form>)) -> BatchOption<E> {
-    let help = "Form of operator; auto: average over the forms that the data allow; lead with --change sigmoid";
+    let help = "Form of the operator; auto: average over the forms that the data allow (with --change sigmoid: lead)";
     let setting = Setting::new("form", Kind::Choice(&FORMS), help).default("auto");
     BatchOption::new(setting, move |how, option, text| {
         let form = match text {

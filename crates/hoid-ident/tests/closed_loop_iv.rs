@@ -37,7 +37,7 @@ fn remnant() -> Vec<f64> {
     polynomial::from_roots(&all)[1..].to_vec()
 }
 
-/// One trial: `u = (B/F) q^-nk e + v`, `y' = u + d`, `e = -y`.
+/// Returns one trial: `u = (B/F) q^-nk e + v`, `y' = u + d`, `e = -y`.
 fn trial(replication: u64, number: u64) -> Record {
     let n = SAMPLE_COUNT + RUN_IN_SAMPLES;
     let seed = RunSeed {
@@ -145,8 +145,7 @@ fn standard_errors_have_nominal_coverage() {
 #[test]
 fn fit_with_complex_remnant_converges_near_the_truth() {
     let (converged, errors) = study(4, 3);
-    // 24 numbers, correlated within a run: fewer than 15 are beyond 1.96, except with probability 1e-6, and none is
-    // beyond six.
+    // Of the 24 numbers, which are correlated within a run, fewer than half must be beyond 1.96, and none beyond six.
     assert!(converged == 4 && coverage(&errors) > 0.5, "{converged}: {errors:?}");
     assert!(errors.iter().flatten().all(|z| z.abs() < 6.0), "{errors:?}");
 }

@@ -105,7 +105,7 @@ fn noise_free_change_is_recovered() {
     }
     assert_eq!(fit.termination().reason, Reason::ExactFit);
     assert!(fit.has_change() && fit.covariance().is_none());
-    // The operator before and after the change, by the parameter names of the family.
+    // The operators before and after the change have the parameter names of the family.
     let (before, after) = (fit.initial_operator(), fit.last_operator());
     for (operator, [gain, lead]) in [(before, END_PARAMETERS[0]), (after, END_PARAMETERS[1])] {
         for (name, expected) in [("K", 5.0 * gain), ("K_over_T_I", gain), ("T_L", lead), ("T_I", 5.0)] {
@@ -121,7 +121,7 @@ fn noise_free_change_is_recovered() {
 
 #[test]
 fn squared_lead_is_recovered() {
-    // With a direct part: the squared lead has as many zeros as there are poles.
+    // The operator has a direct part, since the squared lead has as many zeros as there are poles.
     let mut with = scenario(Form::Lag, 0.0);
     for (state, [gain, lead]) in [(&mut with.initial, [0.9, 0.1]), (&mut with.last, [0.5, 0.2])] {
         let [_, omega, zeta, tau] = CONSTANT_PARAMETERS;
@@ -146,7 +146,8 @@ fn squared_lead_is_recovered() {
 
 #[test]
 fn level_of_u_is_found_without_bias() {
-    // Mean square of the level in standard errors, for records without a level and with a level in u.
+    // Each record is fitted without and with an added level of u. The squares of the level, in standard errors, are
+    // summed.
     let (runs, level) = (6, 0.7);
     let with_level = SigmoidChange {
         level: true,
@@ -166,7 +167,7 @@ fn level_of_u_is_found_without_bias() {
         let moved = Record::new(record.sample_time(), e, channel("u", record.output(), level)).unwrap();
         let clean = with_level.fit(std::slice::from_ref(&record)).unwrap();
         let fit = with_level.fit(std::slice::from_ref(&moved)).unwrap();
-        // Equal within the tolerance of the searches.
+        // The two fits are equal within the tolerance of the searches.
         for (a, b) in clean.parameters().iter().zip(fit.parameters()) {
             let (a, b) = (a.estimate, b.estimate);
             let error = a.standard_error.unwrap_or(f64::INFINITY);
@@ -190,15 +191,15 @@ fn level_of_u_is_found_without_bias() {
     assert!((0.68..18.5).contains(&squares), "{squares}");
 }
 
-/// Returns the errors of `runs` fits in standard errors; t_M and G are included if their errors are normal.
-fn study(runs: u64) -> Vec<(String, Vec<f64>)> {
+/// Returns the errors of `runs` fits in units of the standard error; t_M and G are included if their errors are normal.
+fn standardised_errors(runs: u64) -> Vec<(String, Vec<f64>)> {
     // The remnant is so small that the errors are normal after one minute.
     let scenario = scenario(Form::LeadLag, 0.02);
     let mut all: Vec<(String, Vec<f64>)> = truth().iter().map(|(name, _)| ((*name).to_owned(), vec![])).collect();
     for replication in 0..runs {
         let record = run(&scenario, replication);
         let records = std::slice::from_ref(&record);
-        // With the prior used for people.
+        // The prior is the one used for people.
         let estimator = SigmoidChange {
             prior: OperatorPrior::population(),
             ..estimator(Form::LeadLag)
@@ -231,7 +232,7 @@ fn study(runs: u64) -> Vec<(String, Vec<f64>)> {
 fn errors_have_nominal_coverage_over_simulated_runs() {
     let runs = 10;
     let (mut inside, mut count) = (0, 0);
-    for (name, errors) in study(runs) {
+    for (name, errors) in standardised_errors(runs) {
         let n = errors.len() as f64;
         let mean = errors.iter().sum::<f64>() / n;
         let square = errors.iter().map(|z| z * z).sum::<f64>() / n;
@@ -329,7 +330,7 @@ fn no_change_is_reported() {
     let verdict = fit.verdict(records).unwrap();
     assert!(verdict.findings().iter().any(|f| f.kind == "no-change"), "{verdict}");
 
-    // No excitation, a record that is too short, and an invalid option.
+    // A record without excitation, a record that is too short and invalid options are rejected.
     let still = Channel::new("e", "deg", vec![0.0; record.len()]);
     let still = Record::new(record.sample_time(), still, record.output_channel().clone()).unwrap();
     let silent = estimator(Form::LeadLag).fit(&[still]);

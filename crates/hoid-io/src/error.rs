@@ -132,7 +132,7 @@ pub enum IoError {
         /// The first cells of the line.
         found: String,
     },
-    /// A text of JSON.
+    /// JSON text in place of a table.
     #[error(
         "{file} holds JSON, expected a table with a header such as t,e,u; save the samples as CSV (hoid stream reads \
          lines of JSON, but no other command does)"
@@ -211,7 +211,7 @@ pub enum IoError {
         /// Number of names in the header.
         expected: usize,
     },
-    /// A quotation mark without its closing mark, which would make one cell of many lines.
+    /// A quotation mark without its closing mark, which would merge many lines into one cell.
     #[error(
         "{file}, {location}: a quotation mark opens a cell in this line and {end}, expected a closing mark at the end of \
          the cell; remove the mark, or close the cell with a second one"
@@ -402,7 +402,7 @@ pub enum IoError {
         found: usize,
     },
     /// Several trials where a single trial is expected.
-    #[error("{file} holds {} trials by {trial_column}: {}; read one of them with --trial {trial_column}={}", .trials.len(), list_of_names(.trials), .trials.first().map_or("", |name| name.as_str()))]
+    #[error("{file} holds {} trials according to {trial_column}: {}; read one of them with --trial {trial_column}={}", .trials.len(), list_of_names(.trials), .trials.first().map_or("", |name| name.as_str()))]
     SeveralTrials {
         /// Name of the file.
         file: String,
@@ -691,7 +691,7 @@ fn open_end_remedy(column: &str) -> &'static str {
     }
 }
 
-/// Returns the remedy for a row of another length than the header.
+/// Returns the remedy for a row whose length differs from that of the header.
 fn row_length_remedy(found: usize, expected: usize) -> &'static str {
     // In such a row, decimal commas split each number into two cells.
     if expected > 1 && expected.checked_mul(2) == Some(found) {

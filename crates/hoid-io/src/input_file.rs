@@ -30,7 +30,7 @@ pub fn read_settings(path: &Path) -> Result<String, IoError> {
     })
 }
 
-/// Reads like [`read_settings`], but returns the error of the operating system.
+/// As [`read_settings`], but returns the error of the operating system.
 pub(crate) fn settings_text(path: &Path) -> io::Result<String> {
     let is_json = path
         .extension()

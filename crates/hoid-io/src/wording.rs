@@ -92,7 +92,7 @@ pub(crate) fn did_you_mean(unknown: &[&str], names: &[&str]) -> String {
     let of = |asked: &&str| {
         let asked = asked.trim().to_lowercase();
         let score = |name: &str| (strsim::jaro(&asked, &name.trim().to_lowercase()), name.to_owned());
-        // Of the parts of a signal, its values.
+        // Of equally similar parts of a signal, the part that contains the values is suggested.
         let is_values = |name: &str| VALUE_PARTS.iter().any(|part| name.to_lowercase().ends_with(part));
         // One or two letters occur in many longer names: only a name that starts with them is suggested.
         let is_near = |name: &&&str| asked.chars().count() > 2 || name.trim().to_lowercase().starts_with(&asked);

@@ -58,7 +58,7 @@ fn assert_identical(found: &[f64], expected: &[f64]) {
     );
 }
 
-/// e and u at 80 Hz.
+/// Checks that the record contains e and u at 80 Hz.
 fn assert_complete_record(read: &ReadRecord) {
     assert_eq!(read.record.sample_time().s(), 0.0125);
     assert_close(read.record.input(), &e());
@@ -93,7 +93,7 @@ fn numpy_archives_are_read() {
         channel(&read("npz/savez_compressed.npz", "e", "f[0,:]"), "f[0,:]"),
         &u(),
     );
-    // Further arrays, and entries that are not columns.
+    // Further arrays become channels, and entries that are not columns are reported.
     let found = read("npz/savez_compressed.npz", "e", "u");
     assert_eq!(found.record.channels().count(), 6);
     let found = read("npz/others.npz", "e", "u");
@@ -148,7 +148,8 @@ fn matlab_variables_are_read() {
         if name != "mat/h5py_v73.mat" {
             assert_close(channel(&read(&name, "e", "u"), "wide(2,:)"), &scaled(3.0, &u()));
         }
-        // Elements of structures, selected by their full path and by the end of the path, with the nearest time.
+        // Elements of structures are selected by their full path or by the end of the path, and the nearest time is
+        // used.
         for run in 1..=3_i32 {
             let factor = f64::from(run);
             for path in ["run", "data.run"] {
@@ -252,7 +253,7 @@ fn names_are_searched_in_nested_structures() {
         read("mat/octave_struct.mat", "deep.e", "deep.u").record.input(),
         &scaled(5.0, &e()),
     );
-    // Deeply nested structures.
+    // Structures nested too deeply are rejected.
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("deep.mat");
     let mut inner = element(
@@ -290,7 +291,7 @@ fn element(kind: u32, bytes: &[u8]) -> Vec<u8> {
 
 #[test]
 fn xdf_streams_are_joined() {
-    // The error of one stream, interpolated to the times of the stick in another stream.
+    // The error of one stream is interpolated to the times of the stick in another stream.
     let found = read("xdf/tracking.xdf", "e", "u");
     let record = &found.record;
     assert!((1.0 / record.sample_time().s() - 25.0).abs() < 0.05);
@@ -363,7 +364,7 @@ fn unusable_variables_are_refused_with_the_reason() {
 
 const WRITTEN_FORMATS: [&str; 2] = ["npz", "mat"];
 
-/// Numbers in [-1, 1) from a linear congruential generator (Knuth's MMIX constants).
+/// Pseudo-random numbers from a linear congruential generator (Knuth's MMIX constants).
 struct Draw(u64);
 
 impl Draw {

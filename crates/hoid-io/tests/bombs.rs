@@ -25,7 +25,7 @@ use bombs::{
 use hoid_io::{read_any_scenario, read_fit, read_table, survey};
 use parquet::basic::{Compression, GzipLevel};
 
-/// Largest memory of the process, kB, on systems that report it.
+/// Largest memory of the process in kB, on systems that report it.
 const MAX_MEMORY_KB: u64 = 300_000;
 /// Number of bombs of each format.
 const BOMBS_PER_FORMAT: u64 = 5;

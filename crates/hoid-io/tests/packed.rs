@@ -57,7 +57,7 @@ fn compressed_tables_and_sidecars_are_read() {
         let message = read_record(&desk.path(name), &options).unwrap_err().to_string();
         assert!(message.contains("the first line holds numbers"), "{message}");
     }
-    // A truncated gzip file, and a gzip file with another format inside.
+    // A truncated gzip file, and a gzip file with another format inside, are rejected.
     let packed = gzip(b"t,e,u\n0,1,2\n0.02,3,4\n");
     std::fs::write(desk.path("cut.csv.gz"), &packed[..packed.len() - 6]).unwrap();
     let message = |name: &str| {
@@ -92,7 +92,7 @@ fn inherited_sidecars_are_read() {
     let read = || read_record(&name, &options);
     let message = read().unwrap_err().to_string();
     assert!(message.contains("the first line holds numbers"), "{message}");
-    // JSON files of another task and of another kind, and a damaged JSON file.
+    // JSON files of another task or kind, and a damaged JSON file, do not describe the recording.
     std::fs::write(desk.path("task-rest_physio.json"), json(10)).unwrap();
     std::fs::write(desk.path("task-track_stim.json"), json(20)).unwrap();
     std::fs::write(folder.join("sub-01_physio.json"), "{").unwrap();

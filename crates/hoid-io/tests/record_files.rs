@@ -10,7 +10,7 @@ use common::{TestFolder, default_options, options};
 use hoid_io::{IoError, ReadOptions, ReadRecord, Repair, read_record, write_record};
 use hoid_model::{Channel, Record, SampleTime};
 
-/// Numbers in [-1, 1) from a linear congruential generator (Knuth's MMIX constants); they are the same on every
+/// Pseudo-random numbers from a linear congruential generator (Knuth's MMIX constants); they are the same on every
 /// machine.
 struct Draw(u64);
 
@@ -361,7 +361,7 @@ fn column_expressions_select_and_combine() {
     );
 }
 
-/// Spreadsheet files with decimal commas: semicolons or tabs, a byte order mark, CRLF.
+/// Spreadsheet files with decimal commas give the same record: with semicolons or tabs, a byte order mark or CRLF.
 #[test]
 fn decimal_commas_give_the_same_record() {
     let desk = TestFolder::new();

@@ -445,7 +445,7 @@ fn parquet_records_round_trip() {
 
 #[test]
 fn single_precision_time_is_even() {
-    // At 2000 s single precision resolves 1.2e-4 s, which is rounding and not jitter.
+    // At 2000 s the resolution of single precision is 1.2e-4 s; this rounding is not jitter.
     let read = read_record(&fixture("single"), &ReadOptions::default()).unwrap();
     assert_eq!(read.record.sample_time().s(), 0.01);
     assert_eq!(read.record.len(), 300);

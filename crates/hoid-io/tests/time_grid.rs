@@ -186,7 +186,7 @@ fn given_sampling_rate_overrides_t() {
             "{bad}"
         );
     }
-    // A span of counted samples.
+    // A span also applies to counted samples.
     let span = ReadOptions {
         span_s: (Some(5.02), None),
         ..with(50.0)
@@ -372,7 +372,7 @@ fn time_as_a_signal_is_resampled() {
     );
 }
 
-/// The remainder of a truncated file, or a short span of one.
+/// A single sample, as in a truncated file or a short span, cannot be resampled.
 #[test]
 fn one_sample_is_not_resampled() {
     let desk = TestFolder::new();
@@ -521,7 +521,7 @@ fn single_wrong_time_is_named_with_its_row() {
         let record = desk.read(&text, &at_50_hz).unwrap().record;
         assert_eq!((record.len(), record.output()[20]), (40, 40.0));
     }
-    // Two rows out of order.
+    // For two rows out of order, the error names the line and the remedy.
     let message = desk.error(
         text(&|k| 0.02 * if k / 2 == 10 { 41 - k } else { k } as f64),
         &default_options(),
@@ -530,7 +530,7 @@ fn single_wrong_time_is_named_with_its_row() {
         message.contains("line 23") && message.contains("sort the rows by t"),
         "{message}"
     );
-    // The clock was set back for longer than a few rows.
+    // For a clock that was set back for longer than a few rows, the error suggests trials.
     let set_back = text(&|k| 0.02 * if k < 25 { k } else { k - 10 } as f64);
     assert!(desk.error(&set_back, &default_options()).contains("use --trial t"));
     let second = ReadOptions {
@@ -598,7 +598,7 @@ fn unit_inferred_from_steps_is_reported_with_its_remedy() {
     assert_eq!(count.record.sample_time().s(), 0.01);
     let note = "t is in s, from ms, since its integers advance by 10; if they are in s, add --time t:s";
     assert_eq!(count.notes, [note]);
-    // With the named remedy, with decimals, and in steps of whole minutes, the times are in s.
+    // With the remedy of the message, with decimals, or in steps of whole minutes, the times are in s.
     let slow = [
         (whole as fn(i64) -> String, Some("t:s"), 10.0),
         (|k| format!("{:.1}", 5.0 * k as f64), None, 5.0),

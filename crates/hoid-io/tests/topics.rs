@@ -56,8 +56,8 @@ fn trials_are_not_joined_as_topics() {
             .collect::<String>()
     };
     let message = desk.error(format!("t,e,u\n{}{}", trial(0), trial(7)), &default_options());
-    assert!(message.contains("2 trials by t"), "{message}");
-    // A table with only one topic, or without any value.
+    assert!(message.contains("2 trials according to t"), "{message}");
+    // A table with only one topic, or without any value, is not joined.
     for text in ["t,e,u\n0,1,\n1,2,\n0,1,\n1,2,\n", "t,e,u\n1,,\n0,,\n"] {
         let message = desk.error(text, &default_options());
         assert!(!message.contains("joined"), "{message}");

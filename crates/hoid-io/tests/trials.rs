@@ -81,7 +81,10 @@ fn trials_are_split_by_restarting_time_or_a_column() {
             assert_eq!(read.record.label(), format!("run ({label})"));
         }
         assert!(
-            read[0].notes.iter().any(|note| note.starts_with("3 trials by ")),
+            read[0]
+                .notes
+                .iter()
+                .any(|note| note.starts_with("3 trials according to ")),
             "{:?}",
             read[0].notes
         );
@@ -101,7 +104,7 @@ fn several_trials_without_a_choice_are_refused() {
     let desk = TestFolder::new();
     let message = desk.error(trial_text("trial,t,e,u", |k| format!("{k},"), true), &default_options());
     assert!(
-        message.contains("holds 3 trials by trial: 0, 1, 2; read one of them with --trial trial=0"),
+        message.contains("holds 3 trials according to trial: 0, 1, 2; read one of them with --trial trial=0"),
         "{message}"
     );
     // A clock that is set back by a row does not start a trial.

@@ -1,10 +1,10 @@
-//! Calibration of the latency that page and events add to an identified delay.
+//! Calibration of the latency that the page and its events add to an identified delay.
 //!
 //! A simulated operator replaces the person: it runs in the page in real time, with the displayed error as input and
 //! pointer events as output. Its gain, neuromuscular system and delay tau are known. The delay identified by
-//! `hoid identify` minus tau is the latency of page, frames and events, which is part of every delay identified on this
-//! computer. The latency does not include the screen (from the frame buffer to the light) or the device (from the hand
-//! to the event), which can be measured only with a sensor.
+//! `hoid identify` minus tau is the latency of the page, its frames and its events, which is part of every delay
+//! identified on this computer. The latency does not include the screen (from the frame buffer to the light) or the
+//! device (from the hand to the event), which can be measured only with a sensor.
 
 use std::path::Path;
 
@@ -40,7 +40,7 @@ const NEUROMUSCULAR_PRIOR_SPREAD: f64 = 0.01;
 pub struct Calibration {
     /// Time of the calibration in UTC.
     pub utc: String,
-    /// Latency of page, frames and events, s.
+    /// Latency of the page, its frames and its events, s.
     pub latency_s: f64,
     /// Standard error of the latency, s.
     pub latency_se_s: f64,

@@ -133,7 +133,7 @@ pub struct Condition {
     pub half_width: f64,
     /// Display of the task.
     pub display: Display,
-    /// Length of the preview, s: the display shows the target up to this time ahead.
+    /// Length of the preview (s): the display shows the target up to this time ahead.
     pub preview_s: f64,
     /// u at full deflection of the device.
     pub full_deflection: f64,
@@ -155,8 +155,8 @@ pub struct Signal {
     pub largest: u32,
     /// Root mean square of the signal.
     pub rms: f64,
-    /// Choice of the prime multiples that the signal contains. If the display shows the target, target and disturbance
-    /// need different lines: `even` for one of them and `odd` for the other.
+    /// Choice of the prime multiples that the signal contains. If the display shows the target, the target and the
+    /// disturbance need different lines: `even` for one of them and `odd` for the other.
     #[serde(skip_serializing_if = "is_all")]
     pub interleaved: Interleaved,
 }

@@ -109,7 +109,7 @@ impl LagFits {
         self.u.push(sample.u);
     }
 
-    /// Discards the samples before a change of the operator at the time `at_s`.
+    /// Discards the samples before a change in the operator at the time `at_s`.
     pub fn discard_before(&mut self, at_s: f64) {
         let past = ((at_s - self.from_s) / self.ts.s())
             .ceil()

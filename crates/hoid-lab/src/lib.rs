@@ -15,11 +15,11 @@
 //! | [`verify`] | [`check`](verify::check): verification of a run, with the reasons if it is unverified |
 //! | [`record`] | conversion of a run to a record for all commands of hoid |
 //! | [`live`], [`lag`] | the live estimate during a run; the estimate of the lag of the person |
-//! | [`wire`] | messages between page and server |
+//! | [`wire`] | messages between the page and the server |
 //! | [`lab`] | [`Lab`]: the experiment as its pages interact with it |
 //! | [`server`] | [`Server`]: HTTP and sockets on 127.0.0.1 |
 //! | `experiment`, `export`, `replay`, `reports` | files outside the sessions; archives; replay of runs; result pages |
-//! | [`calibrate`] | the delay that page, frames and events add to the loop |
+//! | [`calibrate`] | the delay that the page, its frames and its events add to the loop |
 
 // Numbers from a page or a file are checked before they are used as an index, a length or a summand.
 #![cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]

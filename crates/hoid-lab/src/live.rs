@@ -51,7 +51,7 @@ pub struct LiveLine {
     pub gain: ReportedValue,
     /// Lead T_L, s.
     pub lead_s: ReportedValue,
-    /// Lag T_I, s, if the data determine the lag.
+    /// Lag T_I (s), if the data determine the lag.
     pub lag_s: ReportedValue,
     /// Reason why no lag is reported; `None` if the lag is reported.
     pub lag_waiting: Option<&'static str>,
@@ -63,7 +63,7 @@ pub struct LiveLine {
     pub crossover_rad_s: ReportedValue,
     /// Phase margin, deg.
     pub phase_margin_deg: ReportedValue,
-    /// Time of a change, s, if one was declared in this update.
+    /// Time of a change (s), if one was declared in this update.
     pub changed_s: Option<f64>,
     /// Reason why there is no estimate yet; `None` if there is an estimate.
     pub waiting: Option<String>,
@@ -327,8 +327,8 @@ pub(crate) mod tests {
 
     #[test]
     fn margins_and_errors_match_the_closed_form() {
-        // With Y = 1 and P = 3 e^{-0.2 s}/s, omega_c = 3 and phi_m = 90 deg - 0.6 rad. A change of ln|Y| changes
-        // omega_c with the factor 3, and phi_m with the slope -0.2.
+        // With Y = 1 and P = 3 e^{-0.2 s}/s, omega_c = 3 and phi_m = 90 deg - 0.6 rad. A change in ln|Y| changes
+        // omega_c by 3 times as much, and phi_m by -0.2 times the change in omega_c.
         let element: ContinuousTransferFunction = "3/s".parse().unwrap();
         let y = |omega: f64| {
             let (sin, cos) = (-0.2 * omega).sin_cos();

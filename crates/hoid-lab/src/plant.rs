@@ -1,7 +1,7 @@
 //! The controlled element over one tick, and the conversion of device positions to u. The page executes the same
 //! arithmetic operations in the same order (`page/src/plant.ts`), so both give identical bits.
 //!
-//! At tick k, with the held input u from the device, disturbance d and target f,
+//! At tick k, with the held input u from the device, the disturbance d and the target f,
 //!
 //! `v = u + d`, `y = C x + D v`, `e = f - y`, then `x <- A x + B v`.
 //!

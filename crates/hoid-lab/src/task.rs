@@ -2,8 +2,8 @@
 //!
 //! The controlled element is discretised exactly over a tick of 1 ms (zero-order hold, [`hoid_model::zoh_system`]). If
 //! it varies, the matrices of each block of ten ticks are computed from the continuous model at the middle of the
-//! block. Target and disturbance are sampled at every tick; they are faded in linearly over the first seconds of the
-//! run-in, so that a run does not start with a jump.
+//! block. The target and the disturbance are sampled at every tick; they are faded in linearly over the first seconds
+//! of the run-in, so that a run does not start with a jump.
 
 use std::{collections::BTreeMap, f64::consts::TAU};
 
@@ -23,7 +23,7 @@ use crate::{LabError, config::Condition, plant::Plant};
 pub const TICK_S: f64 = 1e-3;
 /// Number of ticks per sample of a record.
 pub const TICKS_PER_SAMPLE: usize = 10;
-/// Time over which target and disturbance are faded in, s.
+/// Time (in s) over which the target and the disturbance are faded in.
 const FADE_S: f64 = 3.0;
 
 /// A controlled element, and the tick from which it applies.

@@ -100,7 +100,7 @@ impl Condition {
 }
 
 impl TaskDefinition {
-    /// Returns the lengths of run-in and measurement, s.
+    /// Returns the lengths of the run-in and the measurement, in s.
     pub fn durations_s(&self) -> (f64, f64) {
         match self {
             Self::Reference(course) => (course.scenario().run_in_s, course.scenario().measurement_s),
@@ -139,7 +139,7 @@ impl TaskDefinition {
         }
     }
 
-    /// True if target and disturbance, in this order, have lines.
+    /// Returns whether the target and the disturbance, in this order, have lines.
     pub fn has_lines(&self) -> [bool; 2] {
         self.excitations()
             .map(|excitation| !excitation.function.sinusoids().is_empty())
@@ -153,7 +153,7 @@ impl TaskDefinition {
         }
     }
 
-    /// Returns the time of the change, s; `None` if the element does not change.
+    /// Returns the time of the change (s); `None` if the element does not change.
     pub fn change_s(&self) -> Option<f64> {
         match self {
             Self::Reference(course) => course.scenario().schedule.change_s(),

@@ -31,7 +31,7 @@ use crate::{
 
 /// Largest relative difference in a table that may be due to different sine functions.
 const TABLE_TOLERANCE: f64 = 1e-9;
-/// A frame counts as missed if the interval between frames exceeds the typical interval by this factor.
+/// A frame counts as missed if the interval between frames exceeds this multiple of the typical interval.
 const MISSED_FRAME_RATIO: f64 = 1.5;
 
 /// Result of the verification of a run.

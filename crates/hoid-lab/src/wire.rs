@@ -1,5 +1,5 @@
-//! Messages between page and server: JSON in text frames, with `type` as the first key. The tables of a run follow its
-//! message as one binary frame of little-endian 64-bit numbers.
+//! Messages between the page and the server: JSON in text frames, with `type` as the first key. The tables of a run
+//! follow its message as one binary frame of little-endian 64-bit numbers.
 
 use std::collections::BTreeMap;
 

@@ -10,7 +10,7 @@ use crate::{ModelError, transfer_function::ContinuousTransferFunction};
 pub struct ControlledElement {
     /// Control gain K_c, deg/deg.
     pub k_c: f64,
-    /// Break frequency omega_b, rad/s; 0 gives a double integrator, a negative value an unstable element.
+    /// Break frequency omega_b, rad/s; 0 gives a double integrator, and a negative value gives an unstable element.
     pub omega_b_rad_s: f64,
 }
 
@@ -53,7 +53,7 @@ mod tests {
     #[test]
     fn break_frequency_separates_single_and_double_integrator() {
         // Asymptotes: K_c/omega_b / s far below omega_b, K_c / s^2 far above. The neglected term changes the magnitude
-        // by (1e-4)^2/2.
+        // by the fraction (1e-4)^2/2.
         let low = response(90.0, 6.0, 6e-4);
         assert!((low.norm() * 6e-4 - 15.0).abs() < 1e-6);
         assert!((low.arg() + std::f64::consts::FRAC_PI_2).abs() < 2e-4);

@@ -189,8 +189,8 @@ mod tests {
         SampleTime::new(0.01).unwrap()
     }
 
-    /// Complex, double, nearly double, real, fast and slow, lightly damped, unstable; signs of both
-    /// gains.
+    /// Returns parameters with complex, double, nearly double, real, fast, slow, lightly damped and unstable poles, and
+    /// with both signs of each gain.
     fn cases() -> Vec<[f64; 5]> {
         let poles = [
             (11.25, 0.35),
@@ -330,8 +330,8 @@ mod tests {
                 let scale = (0..5).map(|k| exact[k][j].abs()).fold(0.0, f64::max);
                 for i in 0..5 {
                     let difference = (up[i] - down[i]) / (2.0 * h);
-                    // Central differences have a truncation error h^2 and a rounding error eps/h; the derivatives are
-                    // at least 1e-3.
+                    // Central differences have a truncation error of order h^2 and a rounding error of order eps/h; the
+                    // derivatives are at least 1e-3.
                     assert!(
                         (exact[i][j] - difference).abs() < 1e-7 * scale + 1e-10,
                         "{p:?} row {i} by {}: {} and {difference}",
@@ -364,7 +364,8 @@ mod tests {
             assert_eq!([before.nk, there.nk, after.nk], [28, 29, 29]);
             let (a, b, c) = (response(&before, 90), response(&there, 90), response(&after, 90));
             for k in 0..90 {
-                // Bound: 1e-9 s times the slope of the response, which is at most omega^2 K_e_dot.
+                // The bound is twice the change in the delay, 1e-9 s, times the slope of the response, which is at most
+                // omega^2 K_e_dot.
                 let bound = 2e-9 * omega * omega * 0.036 + 1e-13;
                 assert!(
                     (a[k] - b[k]).abs() < bound && (c[k] - b[k]).abs() < bound,
@@ -427,7 +428,7 @@ mod tests {
             p[j] = bad;
             assert!(delayed_operator(p, ts()).is_err(), "{j} {bad}");
         }
-        // An exponential that overflows.
+        // An exponential that overflows is an error.
         assert!(delayed_operator([0.09, 0.036, 300.0, -1e4, 0.2837], ts()).is_err());
     }
 }

@@ -52,7 +52,7 @@ pub enum ModelError {
         /// Description of the problem.
         reason: String,
     },
-    /// A record without a sample.
+    /// A record without samples.
     #[error("the record {label} has no samples; check the columns and the time span")]
     EmptyRecord {
         /// Label of the record.

@@ -1,7 +1,7 @@
 //! Estimates as a plain text table: name, value ± standard error, unit.
 //!
-//! The standard error determines the number of digits ([`crate::numbers`]); values are right-aligned, standard errors
-//! are left-aligned.
+//! The standard error determines the number of digits ([`crate::numbers`]); values are right-aligned, and standard
+//! errors are left-aligned.
 
 use std::fmt;
 

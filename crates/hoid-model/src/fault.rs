@@ -1,9 +1,10 @@
-//! A fault of recorded data: kind, location, size, and action.
+//! A fault in recorded data: kind, location, size, and action.
 //!
 //! A [`Fault`] is a stretch of one channel of a record (or of all channels) where the recorded values cannot be those
 //! of the signal. Detection is documented in the modules that implement it; this module describes a fault, so that it
 //! is reported in the same way for files, fits and streams. [`fault_findings`] converts faults to the findings of a
-//! [`Verdict`](crate::Verdict): a repaired fault becomes a note, a fault that is still in the data a warning.
+//! [`Verdict`](crate::Verdict): a repaired fault becomes a note, and a fault that is still in the data becomes a
+//! warning.
 
 use std::fmt;
 
@@ -23,7 +24,7 @@ pub enum FaultKind {
     Idle,
     /// A value that left the range of its channel at one end and re-entered it at the other.
     Wrap,
-    /// A permanent change of level from one sample to the next.
+    /// A permanent change in level from one sample to the next.
     Step,
     /// A stretch in another unit, with values larger by orders of magnitude.
     Scale,
@@ -69,7 +70,7 @@ crate::named_choice!(FaultHandling, "handling of faults", 4, {
     Keep => "keep",
 });
 
-/// Action for a fault.
+/// Action taken on a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum FaultAction {
     /// The fault is reported; the data are unchanged.
@@ -100,7 +101,7 @@ pub struct Fault {
     /// Number of faulty samples.
     pub samples: usize,
     /// Size of the fault: deviation of a spike or a step and modulus of a wrap in the unit of the channel, duration of
-    /// a frozen or idle stretch in s, factor of a change of scale, or the sample time in s for a wrong unit of time.
+    /// a frozen or idle stretch in s, factor of a change in scale, or the sample time in s for a wrong unit of time.
     pub size: f64,
     /// Size of the fault relative to the robust standard deviation of its test statistic for good data; `None` if the
     /// kind has no such statistic.

@@ -2,12 +2,12 @@
 //!
 //! F has its own form, gains and delay. F shares the neuromuscular system of the response to the error (M. M. van
 //! Paassen and M. Mulder, IFAC Man-Machine Systems, 1998; K. van der El et al., IEEE Trans. Cybernetics 46 (2016)
-//! 1199-1209); if this system changes over time, it also changes in F. The gains, times and delay of F may also change,
-//! with the sigmoid of the scenario.
+//! 1199-1209); if this system changes over time, it also changes in F. The gains, time constants and delay of F may
+//! also change, with the sigmoid of the scenario.
 //!
-//! As text, a response is its form and the gain of this form, followed by other parameters by name:
+//! As text, a response consists of its form and the gain of this form, followed by other parameters by name:
 //! `derivative:0.15,tau_f=0.1,preview=0.25`. tau_f is the delay relative to the present target; with a preview it may
-//! be negative. `derivative:0.15..0.3` means `K_d = 0.15 s` before and 0.3 s after the change of the scenario.
+//! be negative. `derivative:0.15..0.3` means `K_d = 0.15 s` before and 0.3 s after the change in the scenario.
 
 use crate::{FamilyOperator, Form, ModelError, SampleTime, delayed_operator::whole_samples, schedule::Schedule};
 
@@ -24,7 +24,7 @@ pub type OperatorWithDelay = (FamilyOperator, (usize, f64));
 pub struct Feedforward {
     /// Operator from the target to u; its delay is relative to the end of the preview.
     pub operator: FamilyOperator,
-    /// Operator after the change of the scenario; `None` if it is the same.
+    /// Operator after the change in the scenario; `None` if it is the same.
     pub last: Option<FamilyOperator>,
     /// Preview time, s.
     pub preview_s: f64,
@@ -40,8 +40,8 @@ impl Feedforward {
         }
     }
 
-    /// Parses a response such as `derivative:0.15,tau_f=0.1,preview=0.25`. `neuromuscular` is omega_nm in rad/s and
-    /// zeta_nm of the person; `None` if the person has no neuromuscular system.
+    /// Parses a response such as `derivative:0.15,tau_f=0.1,preview=0.25`. `neuromuscular` contains omega_nm in rad/s
+    /// and zeta_nm of the person; `None` if the person has no neuromuscular system.
     ///
     /// # Errors
     /// [`ModelError::Operator`] with the part that is wrong.
@@ -140,7 +140,7 @@ impl Feedforward {
         })
     }
 
-    /// Checks preview, delays and forms, and returns the delays before and after the change ([`delays`]).
+    /// Checks the preview, the delays and the forms, and returns the delays before and after the change ([`delays`]).
     ///
     /// # Errors
     /// [`ModelError`], which names the quantity.
@@ -221,9 +221,9 @@ impl Feedforward {
     }
 }
 
-/// Returns name, unit and value of the parameters of the response to a further input: the parameters of its form, and
-/// the delay tau_f relative to the present input. The neuromuscular parameters are omitted, because the response to the
-/// error has the same ones.
+/// Returns the name, the unit and the value of each parameter of the response to a further input: the parameters of its
+/// form, and the delay tau_f relative to the present input. The neuromuscular parameters are omitted, because the
+/// response to the error has the same ones.
 pub fn response_parameters(operator: &FamilyOperator, preview_s: f64) -> Vec<(&'static str, &'static str, f64)> {
     let named = operator.named_parameters().into_iter();
     let own = named.filter(|p| !["omega_nm", "zeta_nm"].contains(&p.name));
@@ -238,7 +238,7 @@ pub fn response_parameters(operator: &FamilyOperator, preview_s: f64) -> Vec<(&'
 /// delay changes, both are rounded to whole samples.
 ///
 /// # Errors
-/// [`ModelError::OutOfRange`] for a delay that is too long in samples.
+/// [`ModelError::OutOfRange`] for a delay of too many samples.
 pub fn delays(tau_s: [f64; 2], sample_time: SampleTime) -> Result<[(usize, f64); 2], ModelError> {
     let changes = tau_s[0] != tau_s[1];
     let mut delays = [(0, 0.0); 2];

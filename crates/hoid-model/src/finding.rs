@@ -14,7 +14,7 @@
 //! A new test affects the verdict only through the findings that it adds.
 //!
 //! A result has several answers, such as the response or a parameter. The verdict contains the [`AnswerVerdict`] of
-//! each: a finding about the whole result affects all answers; in addition, an answer has findings of its own.
+//! each: a finding about the whole result affects all answers; in addition, each answer has its own findings.
 
 use std::{collections::BTreeMap, fmt};
 
@@ -142,7 +142,7 @@ pub struct AnswerVerdict {
 }
 
 impl AnswerVerdict {
-    /// Returns the verdict that follows from the findings, of which the notes are omitted.
+    /// Returns the verdict that follows from the findings; notes are omitted.
     pub fn of(findings: impl IntoIterator<Item = Finding>) -> Self {
         let reasons = findings.into_iter().filter(Finding::is_reason).collect();
         let Verdict { level, findings, .. } = Verdict::of(reasons);
@@ -204,7 +204,7 @@ impl Verdict {
     }
 
     /// Returns the verdict with further findings, which may be the cause of the present findings, inserted before them.
-    /// The answers are judged afterwards, so they are not affected.
+    /// Verdicts on answers are not changed.
     pub fn prepend(self, first: impl IntoIterator<Item = Finding>) -> Self {
         Self {
             answers: self.answers,

@@ -49,7 +49,7 @@ const REFERENCE_LINES: [(f64, f64, f64); 10] = [
 ];
 
 /// Multiples and phases in rad of the disturbance: one line below each line of the target of Table 1, so the lines of
-/// target and disturbance alternate. With these phases, the largest value is 2.0 times the rms.
+/// the target and the disturbance alternate. With these phases, the largest value is 2.0 times the rms.
 const DISTURBANCE_LINES: [(f64, f64); 10] = [
     (2.0, 0.7),
     (4.0, -0.3),
@@ -115,9 +115,9 @@ impl ForcingFunction {
         }
     }
 
-    /// Returns a disturbance for the target of Table 1, with a root mean square in deg: ten lines between the lines of
-    /// the target, so that the responses to target and error can be separated. Each amplitude is proportional to the
-    /// geometric mean of the amplitudes of the neighbouring lines of the target.
+    /// Returns a disturbance for the target of Table 1, with the given root mean square in deg. It has ten lines, one
+    /// below each line of the target, so that the responses to the target and to the error can be separated. Each
+    /// amplitude is proportional to the geometric mean of the amplitudes of the neighbouring lines of the target.
     ///
     /// # Errors
     /// [`ModelError::OutOfRange`] if the root mean square is negative or not finite.
@@ -150,7 +150,7 @@ impl ForcingFunction {
         &self.sinusoids
     }
 
-    /// Returns amplitude and frequency of each sinusoid, for the computation of the remnant gain.
+    /// Returns the amplitude and the frequency of each sinusoid, for the computation of the remnant gain.
     pub fn lines(&self) -> Vec<SpectralLine> {
         let line = |s: &Sinusoid| SpectralLine {
             amplitude: s.amplitude_deg,

@@ -7,7 +7,7 @@
 
 use crate::Record;
 
-/// Units of input and output, from which the unit of a gain follows.
+/// Units of the input and the output, from which the unit of a gain follows.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct GainUnit(Option<(String, String)>);
 

@@ -47,7 +47,7 @@
 //! | [`operator`] | [`OperatorParameters`] and their discrete model |
 //! | [`delayed_operator`](mod@delayed_operator) | the operator with a delay of any fraction of a sample |
 //! | [`operator_family`] | operators with other combinations of gain, lead and lag, as identified for people |
-//! | [`resampling`] | changes of the sampling rate: the filter, and [`Decimation`] of records and streams |
+//! | [`resampling`] | changes in the sampling rate: the filter, and [`Decimation`] of records and streams |
 //! | [`remnant`] | the remnant filter, its discretisations and its retrieval |
 //! | [`remnant_noise`] | the noise model of the exactly held remnant as a function of T_n, with derivatives |
 //! | [`uncertainty`] | standard errors of derived quantities by the delta method |
@@ -56,7 +56,7 @@
 //! | [`family_scenario`] | tasks of people: any operator of the family, any controlled element, a remnant of several parts |
 //! | [`feedforward`] | response of a person to a displayed target, also as text |
 //! | [`zoh_system`] | exact zero-order hold of any rational transfer function |
-//! | [`margins`] | crossover frequency, phase and gain margin |
+//! | [`margins`] | crossover frequency, phase and gain margins |
 //! | [`remnant_gain`] | the gain K_n for a given noise level |
 //! | [`GainUnit`] | units of gains, derived from the units of the channels |
 //! | [`Finding`], [`Verdict`], [`AnswerVerdict`] | observations about a result, and its reliability |

@@ -21,9 +21,9 @@ const ROUNDING_RELATIVE_ERROR: f64 = 16.0 * f64::EPSILON;
 /// Largest number of significant digits of a value with a standard error.
 const MAX_DIGITS: i32 = 8;
 
-/// Returns value and standard error as text, with as many decimals as two significant digits of the standard error
-/// need, but at most eight significant digits; a smaller standard error has its own exponent. If the standard error is
-/// only rounding, a dash replaces it. A value that is not finite gives two dashes.
+/// Returns the value and the standard error as text, with as many decimals as two significant digits of the standard
+/// error need, but at most eight significant digits; a smaller standard error has its own exponent. If the standard
+/// error is only a rounding error, a dash replaces it. A value that is not finite gives two dashes.
 pub fn with_uncertainty(value: f64, standard_error: Option<f64>) -> (String, String) {
     if !value.is_finite() {
         return (DASH.to_owned(), DASH.to_owned());

@@ -163,8 +163,8 @@ impl DiscreteOperator {
             return Err(NotConvertible::NoDelay);
         }
         let c = self.zoh.inverse_zoh(self.sample_time)?;
-        // K_e and omega_nm depend on 1 + f1 + f2, a difference of numbers of order 1. Below this value the difference
-        // consists only of rounding errors.
+        // K_e and omega_nm depend on 1 + f1 + f2, a difference of numbers of order 1. If this difference is nearly
+        // zero, it consists mainly of rounding errors.
         if c.a2 <= 0.0 || has_pole_at_origin(&[self.zoh.f1, self.zoh.f2]) {
             return Err(NotConvertible::NoNaturalFrequency { a1: c.a1, a2: c.a2 });
         }
@@ -245,7 +245,7 @@ mod tests {
 
     #[test]
     fn discrete_parameters_match_expected_values() {
-        // Independent values from the deterministic part of the expected values.
+        // Expected values of the deterministic part, computed independently.
         let expected = [(s1(), 0.0442765923, -0.0431823806), (s2(), 0.1024498216, -0.1015987680)];
         for (operator, b0, b1) in expected {
             let d = operator.discretise(ts()).unwrap();
@@ -305,8 +305,8 @@ mod tests {
                 let (up, down) = (at(up), at(down));
                 for i in 0..4 {
                     let difference = (up[i] - down[i]) / (2.0 * h);
-                    // Central differences have a truncation error h^2 and a rounding error eps/h, both below 1e-8 of
-                    // the column.
+                    // Central differences have a truncation error of order h^2 and a rounding error of order eps/h,
+                    // both below 1e-8 of the largest entry of the column.
                     let scale = (0..4).map(|k| exact[k][j].abs()).fold(0.0, f64::max);
                     assert!(
                         (exact[i][j] - difference).abs() < 2e-8 * scale,
@@ -360,7 +360,7 @@ mod tests {
             NotConvertible::ZeroGain
         ));
         assert!(matches!(reason([1.0, 0.0], [-1.9, 0.92], 0), NotConvertible::NoDelay));
-        // An unstable complex pair converts; the result reports that it is not stable.
+        // An unstable complex pair can be converted; the result reports that it is not stable.
         let unstable = model([0.044, -0.043], [-1.95, 1.01], 29).parameters().unwrap();
         assert!(!unstable.is_stable());
     }

@@ -1,7 +1,7 @@
 //! The identified model: polynomials with numerical coefficients.
 //!
-//! `A u = (B/F) q^-nk e + (C/D) eps`, with theta = `[a1.. b0.. c1.. d1.. f1..]`. The system from e
-//! to u is `B q^-nk/(A F)`, the noise filter `C/(A D)`.
+//! `A u = (B/F) q^-nk e + (C/D) eps`, with theta = `[a1.. b0.. c1.. d1.. f1..]`. The system from e to u is
+//! `B q^-nk/(A F)`, and the noise filter is `C/(A D)`.
 
 use hoid_core::stability::roots_inside;
 use num_complex::Complex64;

@@ -39,7 +39,7 @@ impl Channel {
     }
 }
 
-/// Trend that is removed from input and output before a fit.
+/// Trend that is removed from the input and the output before a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum Detrend {
     /// No trend: the data remain unchanged.
@@ -243,10 +243,11 @@ impl Record {
         })
     }
 
-    /// Returns this record followed by another record, which starts one sample time after the last sample of this
-    /// record, so the time of the boundary is known.
+    /// Returns this record followed by the samples of another record, the first of which is placed one sample time
+    /// after the last sample of this record.
     ///
-    /// Channels that only one of the two records has are omitted; label, names and units are those of the first record.
+    /// Channels that only one of the two records has are omitted; the label, the names and the units are those of the
+    /// first record.
     ///
     /// # Errors
     /// [`ModelError::Joined`] if the sample times differ by more than one part in a million, or if only one of the two
@@ -286,14 +287,14 @@ impl Record {
         Ok(self)
     }
 
-    /// Returns the record with the mean or the least-squares line of input and output removed; other channels remain
-    /// unchanged.
+    /// Returns the record with the mean or the least-squares line of the input and the output removed; other channels
+    /// remain unchanged.
     pub fn detrended(mut self, how: Detrend) -> Self {
         self.signals_mut().for_each(|values| subtract_trend(how, values));
         self
     }
 
-    /// Returns the record with a function, such as a filter, applied to input and output; other channels remain
+    /// Returns the record with a function, such as a filter, applied to the input and the output; other channels remain
     /// unchanged.
     ///
     /// # Errors
@@ -304,7 +305,7 @@ impl Record {
         Ok(self)
     }
 
-    /// Iterates over the values of input and output, in this order.
+    /// Iterates over the values of the input and the output, in this order.
     fn signals_mut(&mut self) -> impl Iterator<Item = &mut [f64]> {
         let channels = self.input.iter_mut().chain([&mut self.output]);
         channels.map(|channel| channel.values.as_mut_slice())

@@ -53,13 +53,13 @@ const RELATIVE_TOLERANCE: f64 = 1e-10;
 
 /// Computes the remnant gain K_n for a noise level P_n.
 ///
-/// `order` and `time_constant_s` describe the remnant filter and `lines` the forcing function; `sample_time` is the
-/// time between two draws of the noise. K_n is 0 for a level of 0.
+/// `order` and `time_constant_s` describe the remnant filter, and `lines` describes the forcing function; `sample_time`
+/// is the time between two draws of the noise. K_n is 0 for a level of 0.
 ///
 /// # Errors
 /// [`ModelError::OutOfRange`] for a level below 0 (or not below 1 for [`NoiseDefinition::Response`]), a remnant order
 /// other than 1 to 4, an invalid time constant or line, or a forcing function that does not excite u;
-/// [`ModelError::UnstableLoop`] if the loop of operator and controlled element is unstable;
+/// [`ModelError::UnstableLoop`] if the loop of the operator and the controlled element is unstable;
 /// [`ModelError::UnreachableNoiseLevel`] for a level that [`NoiseDefinition::Remnant`] cannot reach.
 #[allow(clippy::too_many_arguments)]
 pub fn remnant_gain(
@@ -176,8 +176,8 @@ impl ClosedLoop<'_> {
         (num_operator * den_element / characteristic).norm()
     }
 
-    /// Returns numerator and denominator of the operator without delay, denominator of the element, and characteristic
-    /// function.
+    /// Returns the numerator and the denominator of the operator without delay, the denominator of the element, and the
+    /// characteristic function.
     fn at(&self, omega: f64) -> [Complex64; 4] {
         let s = Complex64::new(0.0, omega);
         let horner = |p: &[f64]| p.iter().fold(Complex64::new(0.0, 0.0), |sum, &c| sum * s + c);
@@ -227,7 +227,7 @@ const GAUSS_WEIGHTS: [f64; 4] = [
     0.417_959_183_673_469_4,
 ];
 
-/// An interval with its integral and the difference between the Gauss and the Kronrod rule.
+/// An interval with its integral and the difference between the Gauss and Kronrod rules.
 struct Interval {
     from: f64,
     to: f64,
@@ -374,7 +374,7 @@ mod tests {
         ];
         for (s, m, by_noise, forced) in expected {
             let found = gain(0.5, NoiseDefinition::Response, m, s).unwrap();
-            // The integral is accurate to 1e-10, the gain to half of this value.
+            // The integral is accurate to 1e-10, and the gain to half of this value.
             assert!((found / (forced / by_noise).sqrt() - 1.0).abs() < 1e-10);
         }
         let own = remnant_integral(4, 6.0 * std::f64::consts::PI) / (6.0 * std::f64::consts::PI);
@@ -426,7 +426,7 @@ mod tests {
     #[test]
     fn sharp_peaks_are_integrated() {
         // Just below the gain at which the loop becomes unstable, the integrand has a peak of relative width 1e-6. V_u
-        // is dominated by its residue, which is inversely proportional to the distance from this gain.
+        // is dominated by this peak and is inversely proportional to the distance from this gain.
         let [(operator, element), _] = states();
         let margin = crate::margins::margins(|w| operator.series(&element).response(w), (0.1, 100.0));
         let limit = 10f64.powf(margin.gain_margin_db.unwrap() / 20.0);

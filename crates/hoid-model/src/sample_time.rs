@@ -60,7 +60,7 @@ impl SampleTime {
         std::f64::consts::PI / self.0
     }
 
-    /// Returns a time in s as a number of samples, or `None` if it is not within `1e-6` samples of an integer number.
+    /// Returns a time in s as a number of samples, or `None` if it is not within `1e-6` samples of an integer.
     ///
     /// The quotient is rounded, never truncated: `0.29 / 0.01` is `28.999999999999996` in floating point and means 29.
     pub fn whole_samples(self, time_s: f64) -> Option<usize> {

@@ -9,10 +9,10 @@
 //! | C3, C4 | s1 to s2 at 40.96 s | 0.5, 100 1/s |
 //! | C5, C6 | s2 to s1 at 40.96 s | 0.5, 100 1/s |
 //!
-//! The gains, time constants and frequencies of operator and controlled element and the remnant gain K_n follow one
-//! sigmoid (eq. 5); the remnant time constant is constant. The delay is constant in the conditions of the thesis; if it
-//! changes, it follows the same sigmoid, in steps of one sample. The remnant gain of each state is the gain that gives
-//! the required noise level in that state (eq. 43 or A.17).
+//! The gains, time constants and frequencies of the operator and the controlled element and the remnant gain K_n follow
+//! one sigmoid (eq. 5); the remnant time constant is constant. The delay is constant in the conditions of the thesis;
+//! if it changes, it follows the same sigmoid, in steps of one sample. The remnant gain of each state is the gain that
+//! gives the required noise level in that state (eq. 43 or A.17).
 
 use num_complex::Complex64;
 
@@ -186,7 +186,8 @@ pub struct Scenario {
     /// Response of u to the displayed target; `None` if the display shows only the error. Its neuromuscular system is
     /// that of the operator.
     pub feedforward: Option<Feedforward>,
-    /// Disturbance d at the input of the controlled element, held over each sample; without sinusoids, there is none.
+    /// Disturbance d at the input of the controlled element, held over each sample; without sinusoids, there is no
+    /// disturbance.
     pub disturbance: ForcingFunction,
     /// Remnant.
     pub remnant: RemnantSetting,
@@ -544,7 +545,8 @@ mod tests {
         assert_eq!([0.0, 40.96, 81.92].map(|t| resolved.delay_samples_at(t)), [28, 31, 34]);
         for k in 0..8192 {
             let p = resolved.parameters_at(0.01 * f64::from(k));
-            // The gain and the delay have completed the same share of their change, to within half a sample of six.
+            // The gain and the delay have completed the same share of their change, to within half a sample of the six
+            // by which the delay changes.
             let share = (p.operator.k_e - 0.09) / (0.07 - 0.09);
             let samples = p.operator.tau_e_s / 0.01;
             assert!((samples - samples.round()).abs() < 1e-9);

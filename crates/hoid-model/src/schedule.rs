@@ -1,4 +1,4 @@
-//! Change of parameters over time.
+//! Change in parameters over time.
 //!
 //! `p(t) = p_i + (p_f - p_i) / (1 + e^{-G (t - t_M)})`   (eq. 5)
 //!
@@ -7,7 +7,7 @@
 
 use crate::ModelError;
 
-/// Change of every parameter of a scenario from its initial to its final value.
+/// Change in every parameter of a scenario from its initial to its final value.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Schedule {
     /// No change: each parameter keeps its initial value.

@@ -171,7 +171,7 @@ pub fn zoh_biproper(num: [f64; 3], den: [f64; 3], sample_time: SampleTime) -> Re
     Ok(([d, d * held.f1 + held.b0, d * held.f2 + held.b1], [held.f1, held.f2]))
 }
 
-/// Inverse of [`zoh_biproper`]: returns numerator and monic denominator in descending powers of s.
+/// Inverse of [`zoh_biproper`]: returns the numerator and the monic denominator in descending powers of s.
 ///
 /// # Errors
 /// As [`ZohSecondOrder::inverse_zoh`].
@@ -250,7 +250,8 @@ mod tests {
         }
     }
 
-    /// Complex, real, nearly equal, double, at the origin, near the origin, unstable, fast.
+    /// Returns systems with poles that are complex, real, nearly equal, double, at or near the origin, unstable, or
+    /// fast.
     fn cases() -> Vec<SecondOrder> {
         let c = Complex64::new;
         let r = |a: f64, b: f64| (c(a, 0.0), c(b, 0.0));

@@ -59,8 +59,8 @@ impl OperatorEstimate {
         }
     }
 
-    /// Returns name, unit and estimate of each parameter, in the order in which they are reported; the names of the
-    /// gains are those that [`GainUnit`](crate::GainUnit) uses.
+    /// Returns the name, the unit and the estimate of each parameter, in the order in which they are reported; the
+    /// names of the gains are those that [`GainUnit`](crate::GainUnit) uses.
     pub fn rows(&self) -> [(&'static str, &'static str, Estimate); 6] {
         [
             ("K_e", "", self.k_e),
@@ -231,7 +231,7 @@ mod tests {
     }
 
     /// Lower triangular factor (by rows) of a covariance as in a fit: the errors of b0 and b1, and of f1 and f2, are
-    /// nearly opposite. It is scaled down such that the conversion is linear over its range.
+    /// nearly opposite. It is scaled down so that the conversion is nearly linear over its range.
     fn factor() -> Vec<f64> {
         let rows = [
             [2e-3, 0.0, 0.0, 0.0, 0.0],

@@ -7,8 +7,7 @@
 //! [`crate::cholesky`].
 //!
 //! **General matrices**, several right-hand sides ([`solve_general`]), with row pivoting (G. H. Golub and C. F. Van
-//! Loan,
-//! *Matrix Computations*, 2013, section 3.4).
+//! Loan, *Matrix Computations*, 2013, section 3.4).
 
 /// Number of columns that are computed at a time.
 const COLUMNS_PER_CHUNK: usize = 4;

@@ -3,13 +3,13 @@
 //! | module | contents |
 //! |---|---|
 //! | [`statistics`] | mean, variance, root mean square; quantiles according to three definitions |
-//! | [`products`] | product of two vectors |
+//! | [`products`] | products of vectors and of small matrices |
 //! | [`cholesky`] | small positive definite systems by Cholesky factorisation, and triangular systems |
 //! | [`elimination`] | small positive definite or general systems by elimination, without a stored factor |
 //!
-//! The order of operations of each function is part of its specification: sums run from the first to the last term,
-//! nothing is contracted, and square roots come from `libm`, so results are bit-identical on every machine. If two
-//! functions differ only in rounding, their documentation mentions it.
+//! The order of operations of each function is part of its specification: sums run from the first to the last term, no
+//! multiplication and addition are fused, and square roots come from `libm`, so results are bit-identical on every
+//! machine. If two functions differ only in rounding, their documentation mentions it.
 //!
 //! The crate is `no_std` and allocates no memory; the feature `alloc` adds the statistics that sort their values.
 //! Matrices whose size is known only at run time use nalgebra, and sums over records use `hoid-lanes`.

@@ -1,4 +1,4 @@
-//! Statistics of values.
+//! Basic statistics of a set of values.
 //!
 //! **Quantiles** follow R. J. Hyndman and Y. Fan, *The American Statistician* 50 (1996) 361-365. With the order
 //! statistics `x_0 <= .. <= x_(n-1)` and a fraction p:
@@ -10,8 +10,8 @@
 //! | [`upper_quantile`] | `x_k`, where k is the largest integer not above `n p` | right-continuous inverse of the empirical distribution, type 1 except where `n p` is an integer |
 //!
 //! [`quantile`] is used in tables and figures. [`nearest_quantile`] and [`upper_quantile`] return one of the values and
-//! do not need a full sort. They are used for scales of many samples, and for thresholds whose results depend on the
-//! definition. For the median both return the upper of the two middle values.
+//! do not need a full sort. They are used for robust scale estimates from many samples, and for thresholds whose
+//! results depend on the definition. For the median, both return the upper of the two middle values.
 //!
 //! Values are ordered by [`f64::total_cmp`].
 
@@ -70,8 +70,8 @@ pub fn quantile(sorted: &[f64], fraction: f64) -> Option<f64> {
     Some(low + (at - below as f64) * (high - low))
 }
 
-/// Returns the value nearest to the position of a quantile, or the upper of two equally near values. Reorders the
-/// values. Returns `None` for no values.
+/// Returns the order statistic nearest to the position of a quantile, or the upper of two that are equally near.
+/// Reorders the values. Returns `None` for no values.
 pub fn nearest_quantile(values: &mut [f64], fraction: f64) -> Option<f64> {
     let last = values.len().checked_sub(1)?;
     order_statistic(values, libm::round(last as f64 * fraction) as usize)

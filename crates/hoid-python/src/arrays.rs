@@ -27,7 +27,7 @@ fn vector(values: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     Ok(array.as_slice()?.to_vec())
 }
 
-/// Channels of a record that a call needs in addition to input and output.
+/// Channels of a record that a call needs in addition to the input and the output.
 #[derive(Debug, Clone, Copy)]
 pub enum ChannelSelection<'a> {
     All,

@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 
 use crate::errors::Outcome;
 
-/// Text such as `90/(s(s+6))`, or numerator and denominator in descending powers of s.
+/// Text such as `90/(s(s+6))`, or the numerator and the denominator in descending powers of s.
 #[derive(FromPyObject)]
 pub enum ControlledElement {
     Text(String),

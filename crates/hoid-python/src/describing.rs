@@ -104,7 +104,7 @@ impl PyDescription {
         array(py, self.0.found.phases_deg().iter().map(|p| p.value).collect())
     }
 
-    /// Returns crossover and margins; `None` without a controlled element.
+    /// Returns the crossover frequency and the margins; `None` without a controlled element.
     #[getter]
     fn open_loop<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let Some(margins) = self.0.margins() else {
@@ -271,7 +271,8 @@ impl PyDescribingFunction {
         Ok(all)
     }
 
-    /// Fits gain, lead (s) and delay (s) of the person to the response, and returns them with the misfit.
+    /// Fits the gain, the lead (in s) and the delay (in s) of the person to the response, and returns them with the
+    /// misfit.
     #[pyo3(signature = (*, lead, weights, delay))]
     fn gain_lead_delay<'py>(
         &self,
@@ -299,7 +300,7 @@ impl PyDescribingFunction {
         Ok(all)
     }
 
-    /// Returns crossover frequency and phase margin of the loop with a controlled element.
+    /// Returns the crossover frequency and the phase margin of the loop with a controlled element.
     fn margins<'py>(&self, py: Python<'py>, element: ControlledElement) -> Outcome<Bound<'py, PyDict>> {
         let margins = self.found.open_loop(&element.transfer_function()?).margins().estimates;
         let all = PyDict::new(py);

@@ -84,7 +84,8 @@ pub fn design(
     Ok(found.to_json())
 }
 
-/// Returns the files of a design, given as JSON: scenario, experiment for the lab (empty if there is none), and lines.
+/// Returns the files of a design, given as JSON: the scenario, the experiment for the lab (empty if there is none), and
+/// the lines.
 #[pyfunction]
 pub fn design_files_of(text: &str, scenario: &str) -> Outcome<(String, String, String)> {
     let found = ExperimentDesign::from_json(text)?;

@@ -57,7 +57,7 @@ fn loop_parts<'py>(py: Python<'py>, measures: Option<LoopMeasures>) -> PyResult<
     Ok(all)
 }
 
-/// Returns the 95 % intervals of crossover and phase margin from Student's t distribution.
+/// Returns the 95 % intervals of the crossover frequency and the phase margin from Student's t distribution.
 fn loop_intervals<'py>(py: Python<'py>, measures: Option<LoopMeasures>) -> PyResult<Bound<'py, PyDict>> {
     let all = PyDict::new(py);
     all.set_item("crossover_rad_s", measures.and_then(|m| m.crossover_interval))?;
@@ -248,7 +248,7 @@ impl PyOperatorFit {
         Ok(Some(all))
     }
 
-    /// Returns magnitude in dB and phase in deg of the operator of a record at these frequencies, each with its
+    /// Returns the magnitude in dB and the phase in deg of the operator of a record at these frequencies, each with its
     /// standard error (NaN if there is none).
     fn frequency_response<'py>(
         &self,
@@ -262,13 +262,13 @@ impl PyOperatorFit {
         ))
     }
 
-    /// Returns crossover and phase margin with another controlled element.
+    /// Returns the crossover frequency and the phase margin with another controlled element.
     fn margins<'py>(&self, py: Python<'py>, element: ControlledElement) -> Outcome<Bound<'py, PyDict>> {
         let element = element.transfer_function()?;
         Ok(loop_parts(py, self.0.fit.loop_measures(0, &element))?)
     }
 
-    /// Returns crossover and phase margin; `None` without a controlled element.
+    /// Returns the crossover frequency and the phase margin; `None` without a controlled element.
     #[getter]
     fn open_loop<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let of = |element| loop_parts(py, self.0.fit.loop_measures(0, element));
@@ -283,8 +283,8 @@ impl PyOperatorFit {
         self.0.controlled_element.as_ref().map(of).transpose()
     }
 
-    /// Returns crossover and phase margin with the standard errors for the person, not for these runs; `None` without a
-    /// controlled element.
+    /// Returns the crossover frequency and the phase margin with the standard errors for the person, not for these
+    /// runs; `None` without a controlled element.
     #[getter]
     fn open_loop_person<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let of = |element| {
@@ -320,7 +320,7 @@ impl PyOperatorFit {
         (array(py, c), array(py, d))
     }
 
-    /// Returns parameter, centre, spread and source of each entry of the prior.
+    /// Returns the parameter, the centre, the spread and the source of each entry of the prior.
     #[getter]
     fn prior(&self) -> Vec<(String, f64, f64, String)> {
         let entries = self.0.fit.prior.entries().iter();

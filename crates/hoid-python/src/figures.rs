@@ -148,7 +148,8 @@ pub fn ljung_box<'py>(py: Python<'py>, test: Option<&LjungBox>) -> PyResult<Opti
     Ok(Some(all))
 }
 
-/// Returns magnitude in dB and phase in deg at several points, each with its standard error (NaN if there is none).
+/// Returns the magnitude in dB and the phase in deg at several points, each with its standard error (NaN if there is
+/// none).
 pub fn response_columns<'py>(py: Python<'py>, points: &[ResponsePoint]) -> [Bound<'py, PyArray1<f64>>; 4] {
     let column = |of: &dyn Fn(&ResponsePoint) -> f64| array(py, points.iter().map(of).collect());
     [

@@ -152,7 +152,7 @@ pub fn signal_of(text: &str, names: Vec<String>) -> Outcome<Vec<(f64, usize)>> {
     Ok(text.parse::<ColumnExpression>()?.signed_columns(&names, "the table")?)
 }
 
-/// Returns the record with the mean or the linear trend removed from input and output.
+/// Returns the record with the mean or the linear trend removed from the input and the output.
 #[pyfunction]
 #[pyo3(signature = (record, how))]
 pub fn detrended<'py>(py: Python<'py>, record: &Bound<'py, PyAny>, how: &str) -> Outcome<Bound<'py, PyDict>> {

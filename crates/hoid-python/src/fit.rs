@@ -223,7 +223,7 @@ impl PyFit {
 
     /// Returns A, B, C, D and F in ascending powers of q^-1.
     ///
-    /// A, C, D and F start with 1, B with nk zeros for the delay.
+    /// A, C, D and F start with 1, and B starts with nk zeros for the delay.
     #[getter]
     fn polynomials<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let model = self.fit.model();
@@ -370,8 +370,8 @@ impl PyFit {
         Ok(all)
     }
 
-    /// Returns magnitude in dB and phase in deg at these frequencies, each with its standard error (NaN if there is
-    /// none).
+    /// Returns the magnitude in dB and the phase in deg at these frequencies, each with its standard error (NaN if
+    /// there is none).
     fn frequency_response<'py>(
         &self,
         py: Python<'py>,
@@ -399,7 +399,7 @@ impl PyFit {
         self.fit.roots().into_iter().map(one).collect()
     }
 
-    /// Returns crossover and margins of the operator in series with a controlled element.
+    /// Returns the crossover frequency and the margins of the operator in series with a controlled element.
     fn margins<'py>(&self, py: Python<'py>, element: ControlledElement) -> Outcome<Bound<'py, PyDict>> {
         Ok(figures::margins(py, &self.margins_with(&element)?)?)
     }

@@ -67,8 +67,8 @@ pub fn identify<'py>(
 /// not tested.
 type CouplingParts = (String, Option<f64>, bool, String);
 
-/// Identifies the operators of several axes, each with its couplings. `axes` contains the records of each axis, `pairs`
-/// its input and output.
+/// Identifies the operators of several axes, each with its couplings. `axes` contains the records of each axis, and
+/// `pairs` contains its input and output.
 #[pyfunction]
 #[pyo3(signature = (axes, pairs, *, options, faults, decimate))]
 pub fn identify_axes(

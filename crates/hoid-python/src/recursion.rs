@@ -122,7 +122,7 @@ pub fn renamed_method(name: &str) -> Option<(&'static str, String)> {
     hoid_survey::renamed_method(name)
 }
 
-/// Returns name, help text and literature of each recursive method, and the keywords that it accepts.
+/// Returns the name, the help text and the literature of each recursive method, and the keywords that it accepts.
 #[pyfunction]
 pub fn recursive_methods() -> Vec<(&'static str, &'static str, &'static str, Vec<String>)> {
     let keywords = |spec: &MethodSpec| {

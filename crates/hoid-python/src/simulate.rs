@@ -85,7 +85,7 @@ pub fn simulate<'py>(
     Ok(record_to_dict(py, record)?)
 }
 
-/// Returns crossover, margins and remnant gains of a scenario.
+/// Returns the crossover frequency, the margins and the remnant gains of a scenario.
 #[pyfunction]
 #[pyo3(signature = (*, condition, scenario_file, scenario_text, state, noise_levels, noise_definition))]
 pub fn margins<'py>(
@@ -134,7 +134,8 @@ pub fn margins<'py>(
     Ok(all)
 }
 
-/// Returns crossover and margins for an operator of the family, with the gain of each part of its remnant.
+/// Returns the crossover frequency and the margins for an operator of the family, with the gain of each part of its
+/// remnant.
 fn family_margins<'py>(py: Python<'py>, scenario: &FamilyScenario, last: bool) -> Outcome<Bound<'py, PyDict>> {
     let state = if last { &scenario.last } else { &scenario.initial };
     let all = figures::plain_margins(py, &state.margins()?)?;

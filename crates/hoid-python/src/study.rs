@@ -169,7 +169,7 @@ impl PyPlan {
     }
 }
 
-/// Returns names and titles of the plans included with hoid.
+/// Returns the names and the titles of the plans included with hoid.
 #[pyfunction]
 pub fn plan_names() -> Outcome<Vec<(String, String)>> {
     let one = |named: &NamedPlan| -> Result<(String, String), StudyError> {

@@ -51,7 +51,7 @@ impl PyTimeVaryingFit {
         self.0.fit.form().name()
     }
 
-    /// Returns name, estimate, unit and remark for each parameter.
+    /// Returns the name, the estimate, the unit and the remark for each parameter.
     #[getter]
     fn parameters(&self) -> Vec<(String, ValueWithError, &'static str, Option<String>)> {
         let one = |p: hoid_ident::ChangeParameter| {

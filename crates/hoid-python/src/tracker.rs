@@ -17,7 +17,7 @@ use crate::{
 /// The saved state of a tracker: its orders, and all changing values as numbers.
 type SavedParts<'py> = (Option<Bound<'py, PyDict>>, Bound<'py, PyArray1<f64>>);
 
-/// Crossover and margin, or the reason why there are none.
+/// Crossover frequency and phase margin, or the reason why there are none.
 type OpenLoopParts = (
     Option<(figures::ValueWithError, figures::ValueWithError)>,
     Option<&'static str>,
@@ -87,7 +87,7 @@ impl PyTracker {
         }
     }
 
-    /// Processes samples one after the other and returns their innovations.
+    /// Processes the samples one after the other and returns their innovations.
     #[pyo3(signature = (e, u, f_t, update))]
     fn take_all<'py>(
         &mut self,
@@ -213,7 +213,7 @@ impl PyTracker {
         element.map(ToString::to_string)
     }
 
-    /// Returns gain in dB and phase in deg at a frequency in rad/s, each with its standard error.
+    /// Returns the gain in dB and the phase in deg at a frequency in rad/s, each with its standard error.
     fn response(&self, omega: f64) -> Outcome<Option<(figures::ValueWithError, figures::ValueWithError)>> {
         let found = self.tracker()?.response(omega);
         Ok(found.map(|r| {
@@ -224,8 +224,8 @@ impl PyTracker {
         }))
     }
 
-    /// Returns crossover in rad/s and phase margin in deg, or the reason why there are none; `None` without a
-    /// controlled element.
+    /// Returns the crossover frequency in rad/s and the phase margin in deg, or the reason why there are none; `None`
+    /// without a controlled element.
     #[getter]
     fn open_loop(&self) -> Outcome<Option<OpenLoopParts>> {
         let found = self.tracker()?.open_loop();
@@ -241,7 +241,7 @@ impl PyTracker {
         }))
     }
 
-    /// Returns for each parameter of the operator whether the data determine it.
+    /// Returns whether the data determine each parameter of the operator.
     #[getter]
     fn determined(&self) -> Outcome<std::collections::BTreeMap<&'static str, bool>> {
         let tracker = self.tracker()?;

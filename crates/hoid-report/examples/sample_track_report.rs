@@ -13,7 +13,7 @@ use hoid_report::{BatchLine, TraceSection, TrackReport};
 use hoid_sim::{RunSeed, Simulator};
 use hoid_track::{Method, StartSource, Trace, TrackOptions, track};
 
-/// Spans of the batch fits, s: before and after the change at 40.96 s.
+/// Spans of the batch fits (s): before and after the change at 40.96 s.
 const SPANS: [(f64, f64); 2] = [(0.0, 30.72), (51.20, 81.92)];
 
 fn main() -> Result<(), Box<dyn Error>> {

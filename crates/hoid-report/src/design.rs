@@ -59,8 +59,8 @@ pub fn design_figure(design: &ExperimentDesign) -> String {
     curves("design", &title, &grid)
 }
 
-/// Panels of gain and phase of a response: the operator as a curve with its band, and the response at each line with
-/// its error bar.
+/// Panels of the gain and phase of a response: the operator as a curve with its band, and the response at each line
+/// with its error bar.
 fn response_panels(of: &str, between: &[ExpectedResponse], at: &[&DesignedLine]) -> [CurvePanel; 2] {
     let one = |name: &str, unit: &str, part: fn(&ExpectedResponse) -> Estimate| {
         let band: Vec<Estimate> = between.iter().map(part).collect();

@@ -134,7 +134,7 @@ fn operator_summary(found: &IdentifiedModel) -> FitSummary {
     }
 }
 
-/// Crossover and margins in the form that all reports use.
+/// The crossover and the margins in the form that all reports use.
 fn margins(fit: &FamilyFit, element: &ContinuousTransferFunction) -> Option<MarginEstimates> {
     let found = fit.loop_measures(0, element)?;
     let gain_margin = fit.loop_shape(0, element).gain_margin;
@@ -146,7 +146,7 @@ fn margins(fit: &FamilyFit, element: &ContinuousTransferFunction) -> Option<Marg
     })
 }
 
-/// Frequency range of the responses to several inputs, rad/s, and the number of frequencies.
+/// Frequency range of the responses to several inputs (rad/s), and the number of frequencies.
 const CHANNEL_RANGE: (f64, f64) = (0.3, 16.0);
 const CHANNEL_POINTS: usize = 120;
 

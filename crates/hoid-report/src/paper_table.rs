@@ -190,7 +190,7 @@ fn estimate_columns(object: &Map<String, Value>) -> Vec<Column> {
         .filter(|kind| *kind == "trace")
         .and(object.get("last"));
     let of = last.and_then(Value::as_object).unwrap_or(object);
-    // An experiment is planned for the error that a person's variation from run to run leaves.
+    // An experiment is planned with the errors that include a person's variation from run to run.
     let is_design = object.get("kind").is_some_and(|kind| kind == "design");
     let error = if is_design {
         "standard_error_person"

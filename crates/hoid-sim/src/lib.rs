@@ -1,8 +1,8 @@
 //! Sample-by-sample simulation of the closed loop of operator, remnant and controlled element.
 //!
-//! Operator, remnant filter and controlled element are each discretised exactly (zero-order hold), so the simulated
-//! record follows the model of an estimator without integration errors. The random numbers of a run are identified by
-//! seed, cell and replication, not by the thread that computes it, so any run can be repeated alone.
+//! The operator, the remnant filter and the controlled element are each discretised exactly (zero-order hold), so the
+//! simulated record follows the model of an estimator without integration errors. The random numbers of a run are
+//! identified by seed, cell and replication, not by the thread that computes it, so any run can be repeated alone.
 //!
 //! ```
 //! use hoid_model::scenario::{Condition, Scenario};

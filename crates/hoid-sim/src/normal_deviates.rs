@@ -109,7 +109,7 @@ impl BufferedGenerator {
         self.bytes[self.position..].as_chunks().0
     }
 
-    /// Marks the next drawn numbers as used, as many as given.
+    /// Marks this number of drawn numbers as used.
     #[inline(always)]
     fn advance(&mut self, numbers: usize) {
         self.position += 8 * numbers;

@@ -144,7 +144,7 @@ mod tests {
     use super::*;
 
     /// For the error of a run from its run-in on, the control of the operator is bit-identical to the control of the
-    /// run, for every order of the remnant and through a change of the task.
+    /// run, for every order of the remnant and through a change in the task.
     #[test]
     fn operator_run_reproduces_the_control_of_the_simulator() {
         for (condition, order) in [
@@ -175,7 +175,7 @@ mod tests {
         }
     }
 
-    /// A saved operator continues in another operator, also after the end of its scenario.
+    /// A saved state continues in another operator, also after the end of its scenario.
     #[test]
     fn restored_operator_continues_bit_identically() {
         let mut scenario = Scenario::condition(Condition::C4);

@@ -121,8 +121,7 @@ mod tests {
 
     #[test]
     fn noise_matches_the_pinned_values() {
-        // A change of generator or transform would change every published figure: it must be
-        // noticed.
+        // A change in the generator or the transform would change every published figure, so this test must detect it.
         let first: Vec<String> = RunSeed::default()
             .white_noise(3)
             .iter()

@@ -6,16 +6,16 @@
 //!
 //! where y is the response of the operator without delay, r the response to a displayed target ([`TargetResponse`];
 //! zero if only the error is displayed), x the output of the controlled element for the input u + d with a disturbance
-//! d, and z the output of the remnant cascade for unit variance. Operator, controlled element and cascade are then each
-//! advanced exactly by one sample, for a held input: the operator is driven by e, the controlled element by u, and the
-//! cascade by one normal deviate. The hold delays the response by one more sample, so `nk = tau_e/Ts + 1`. The remnant
-//! is not delayed. A changing delay has its value at the sample at which the response arrives: if the delay increases,
-//! parts of the response are repeated; if it decreases, parts are skipped.
+//! d, and z the output of the remnant cascade for unit variance. The operator, the controlled element and the cascade
+//! are then each advanced exactly by one sample, for a held input: the operator is driven by e, the controlled element
+//! by u + d, and the cascade by one normal deviate. The hold delays the response by one more sample, so
+//! `nk = tau_e/Ts + 1`. The remnant is not delayed. A changing delay has its value at the sample at which the response
+//! arrives: if the delay increases, parts of the response are repeated; if it decreases, parts are skipped.
 //!
-//! Operator and controlled element are in controllable canonical form (the states are the output of `1/den` and the
-//! rate of this output). The gains of the operator are in its output matrix; the gains of the controlled element are
-//! placed according to [`Realisation`]. For changing parameters, the matrices at each sample follow from the continuous
-//! model with the parameter values at that sample.
+//! The operator and the controlled element are in controllable canonical form (the states are the output of `1/den` and
+//! the rate of this output). The gains of the operator are in its output matrix; the gains of the controlled element
+//! are placed according to [`Realisation`]. For changing parameters, the matrices at each sample follow from the
+//! continuous model with the parameter values at that sample.
 
 use std::ops::Range;
 

@@ -273,7 +273,7 @@ fn obtained_noise_level_equals_the_requested_level() {
                     "{condition} m={order} {definition:?}: {mean} +- {spread}"
                 );
                 if definition == NoiseDefinition::Response {
-                    // Expected values: a single run scatters by 0.02 to 0.05.
+                    // In the expected values, the level of a single run has a standard deviation of 0.02 to 0.05.
                     assert!((0.015..0.055).contains(&spread), "{condition} m={order}: {spread}");
                 }
             }

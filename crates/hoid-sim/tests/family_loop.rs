@@ -292,7 +292,7 @@ fn describing_function_equals_the_operator_with_a_hold() {
 #[test]
 fn changed_parameters_take_effect_at_once() {
     // All parameters change in a step: from then on the loop is that of the final state, starting from the states of
-    // the initial loop. For comparison, both loops are simulated in one run, each with its own recursion.
+    // the initial loop, so the later u satisfies the difference equation of the final operator.
     let mut scenario = typical_scenario();
     let x = [6.0, 0.4, 0.3, 9.0_f64.ln(), 0.3_f64.ln(), 0.15];
     scenario.last.operator = FamilyOperator::new(Form::LeadLag, true, &x).unwrap();
@@ -305,7 +305,7 @@ fn changed_parameters_take_effect_at_once() {
     let truth = record.channel("omega_nm").unwrap();
     assert!((truth[1200] - 12.0).abs() < 1e-12 && (truth[1201] - 9.0).abs() < 1e-12);
     assert!((record.channel("T_I").unwrap()[2399] - 1.0 / 0.3).abs() < 1e-12);
-    // The response of the final state continues from the earlier response.
+    // The difference equation of the final operator, with the recorded e and u.
     let only = |state: &FamilyState| {
         let held = state.operator.zoh(sample_time()).unwrap();
         (held.nk, held.b, held.f)
@@ -419,7 +419,7 @@ fn each_remnant_has_the_requested_share_of_the_variance() {
         }
         let mean = shares.iter().sum::<f64>() / runs as f64;
         let scatter = shares.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / (runs * (runs - 1)) as f64;
-        // Four standard errors, which are 0.5 to 5 % of the share.
+        // The tolerance is four standard errors; one standard error is 0.5 to 5 % of the share.
         assert!(scatter.sqrt() < 0.06 * mean, "kind {kind}: {mean} {}", scatter.sqrt());
         assert!(
             (mean - 0.2).abs() < 4.0 * scatter.sqrt(),

@@ -24,7 +24,7 @@ fn operator(form: Form, head: &[f64], tau_s: f64) -> FamilyOperator {
     FamilyOperator::new(form, true, &[head, &tail].concat()).unwrap()
 }
 
-/// Scenario of a person who controls 3/(s(s+1)), with separate lines for target and disturbance.
+/// Scenario of a person who controls 3/(s(s+1)), with separate lines for the target and the disturbance.
 fn task(motion: Option<FamilyOperator>) -> FamilyScenario {
     let state = FamilyState {
         operator: operator(Form::Lead, &[0.6, 0.6], 0.2),
@@ -62,12 +62,12 @@ fn coefficient(record: &Record, name: &str, omega: f64) -> Complex64 {
     record.channel(name).unwrap().iter().enumerate().map(turned).sum()
 }
 
-/// At each line of target and disturbance, U = Y E + M Y_out with the exact discrete models.
+/// At each line of the target and the disturbance, U = Y E + M Y_out with the exact discrete models.
 #[test]
 fn motion_response_is_exact_at_every_line() {
     for felt in responses() {
         let mut scenario = task(Some(felt.clone()));
-        // The canals forget with a time constant of 5.9 s.
+        // The response of the canals decays with a time constant of 5.9 s, so the run-in must be long.
         scenario.run_in_s = 160.0;
         let record = FamilySimulator::new(&scenario)
             .unwrap()
@@ -86,7 +86,7 @@ fn motion_response_is_exact_at_every_line() {
                 let of = |name: &str| coefficient(&record, name, omega);
                 let expected = held(&scenario.initial.operator) * of("e") + held(&felt) * of("y");
                 assert!((of("u") / expected - 1.0).norm() < 1e-6, "{felt:?} {omega}");
-                // There is no remnant, and r = e + y.
+                // The target is f_t = e + y.
                 assert!((of("f_t") - of("e") - of("y")).norm() < 1e-9);
             }
         }

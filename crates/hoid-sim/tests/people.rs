@@ -126,7 +126,7 @@ fn other_rates_and_forms_can_be_drawn() {
             (form, 4000)
         );
     }
-    // A lag on 1/s leaves no phase for a margin.
+    // With a lag in series with 1/s, no phase margin is in the accepted range.
     assert!(matches!(
         draw(Plant::Integrator, Form::Lag),
         Err(SimError::NoAcceptablePerson { .. })

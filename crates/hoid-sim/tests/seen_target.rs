@@ -85,7 +85,7 @@ fn both_responses_are_exact_at_every_line() {
 }
 
 /// The same task as a scenario of the family, simulated with matrices of any order, gives the same loop through a
-/// change of the operator, of its neuromuscular system and of the response to the target.
+/// change in the operator, in its neuromuscular system and in the response to the target.
 #[test]
 fn loop_matches_the_family_simulator() {
     for condition in [Condition::C1, Condition::C3, Condition::C4, Condition::C6] {
@@ -149,8 +149,8 @@ fn batched_runs_match_single_runs() {
     }
 }
 
-/// The noise level is the share of the remnant in the variance of u, which now contains the responses to target and
-/// disturbance. The remnant gain is computed for the continuous loop.
+/// The noise level is the share of the remnant in the variance of u, which now contains the responses to the target and
+/// the disturbance. The remnant gain is computed for the continuous loop.
 #[test]
 fn noise_level_refers_to_the_variance_of_all_of_u() {
     for (condition, level) in [(Condition::C1, 0.1), (Condition::C2, 0.2)] {

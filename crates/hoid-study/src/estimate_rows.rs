@@ -29,7 +29,7 @@ pub(crate) struct BlockTables {
 pub(crate) struct EstimateRows<'a> {
     plan: &'a Plan,
     cell: &'a Cell,
-    /// Axes that have a column of their own name.
+    /// Axes that have a column with their name.
     axis_columns: Vec<String>,
     true_response: Option<TrueResponse>,
     /// VAF of the estimators applied so far to the current replication, by name and nk.

@@ -24,7 +24,7 @@ impl NamedPlan {
     /// Parses the plan.
     ///
     /// # Errors
-    /// As [`Plan::parse`].
+    /// Same as [`Plan::parse`].
     pub fn plan(&self) -> Result<Plan, StudyError> {
         Plan::parse(self.text, self.name)
     }

@@ -10,7 +10,7 @@ use crate::plan::EstimatorCell;
 /// Preparation of a record before an estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Preparation {
-    /// Span of the record that is used, s; `None` for the whole record.
+    /// Span of the record that is used (in s); `None` for the whole record.
     pub span_s: Option<(f64, f64)>,
     /// Number n if only every n-th sample is used.
     pub decimate: usize,

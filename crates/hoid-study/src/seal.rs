@@ -100,7 +100,7 @@ pub(crate) fn damage_notes(damaged: &[(u64, String)]) -> Vec<String> {
         .collect();
     if damaged.len() > MAX_LISTED_BLOCKS {
         notes.push(format!(
-            "further damaged blocks that were recomputed: {}",
+            "further damaged blocks ({}) were also recomputed",
             damaged.len() - MAX_LISTED_BLOCKS
         ));
     }

@@ -88,7 +88,7 @@ fn group_recovers_its_people_and_can_be_resumed() {
     }
     assert!(content(&whole) == content(&pieces));
 
-    // A stopped analysis with a damaged table of each kind of block.
+    // A stopped analysis with a damaged table of each kind of block gives the same results when it is resumed.
     let damaged = out.path().join("damaged");
     let left = AtomicU64::new(6);
     let should_continue = || {
@@ -354,8 +354,8 @@ run = "2"
     let out = out.path().join("out");
     run_group(&manifest, data.path(), &out, &RunOptions::default(), &|_| (), &|| true).unwrap();
 
-    // B has 1.2 times the gain of A: the gain increases by 1.58 dB at every frequency where the files are joined, after
-    // 81.92 s.
+    // B has 1.2 times the gain of A: where the files are joined, after 81.92 s, the gain increases by 1.58 dB at every
+    // frequency.
     let settling = read_table(&out.join("settling.parquet")).unwrap();
     let row = texts(&settling, "parameter")
         .iter()

@@ -191,7 +191,7 @@ fn stopped_study_resumes_without_repetition() {
         if outcome.finished {
             break;
         }
-        // A partial file left by a killed program.
+        // A killed program may leave a partial file.
         fs::write(directory.path().join("parts/.tmp123"), b"half").unwrap();
         assert!(sessions < 20, "no end");
     }

@@ -30,8 +30,8 @@
 //! | `multiple_model` | `multiple-model`: a bank of hypotheses about the time of a change; its two-sided estimate |
 //! | `fused` | `fused`: least squares for B with the poles of the prediction-error method |
 //! | [`kernel`] | the computations of `physical` and `multiple-model` for one sample |
-//! | `joint_filter` | `ekf`, `ukf`: Kalman filters for state and parameters jointly |
-//! | `dual_ekf` | `dual-ekf`: two alternating Kalman filters, for state and for parameters |
+//! | `joint_filter` | `ekf`, `ukf`: Kalman filters that estimate the state and the parameters jointly |
+//! | `dual_ekf` | `dual-ekf`: two alternating Kalman filters, one for the state and one for the parameters |
 //! | `linear_network` | `linear-network`: a single linear layer that learns the gains |
 //! | `known_noise` | code common to methods that take the noise model from a batch fit |
 

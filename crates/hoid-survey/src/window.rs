@@ -31,7 +31,7 @@ use hoid_track::{
 
 /// Number of fits after which the search from the last theta is compared with searches from the estimator's own starts.
 const COMPARISON_INTERVAL: usize = 8;
-/// Relative rise of the loss since the last comparison that triggers another comparison.
+/// Relative rise in the loss since the last comparison that triggers another comparison.
 const LOSS_RISE_LIMIT: f64 = 0.25;
 /// Window length divided by the smallest number of samples for a first fit.
 const FIRST_FIT_DIVISOR: usize = 4;

@@ -77,7 +77,7 @@ fn psi_is_the_negative_gradient_of_the_innovation() {
         [0.09, 0.036, 11.25, 0.35, 0.2, -0.8],
         [1e-6, 1e-6, 1e-4, 1e-5, 1e-6, 1e-6],
     );
-    // A delay within a sample, where the model is smooth.
+    // The delay is not a whole number of samples, so the model is smooth at this point.
     check::<6, 16>(
         0,
         Some(2),

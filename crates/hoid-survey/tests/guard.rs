@@ -152,7 +152,7 @@ fn faults_and_actions_are_reported_with_their_times() {
     }
     use {GuardAction as A, GuardKind as K};
     assert_eq!(reported[0], (K::Outlier, A::Held, 4000, 1));
-    // Start and end of the gap, of the span with wrong scale and of the frozen span.
+    // The faults are a gap, a span with a wrong scale, and a frozen span.
     let of = |kind: K, action: A| reported.iter().find(|t| (t.0, t.1) == (kind, action));
     assert!(of(K::Missing, A::Resumed).is_some(), "{reported:?}");
     let level = of(K::Level, A::Restarted).unwrap();

@@ -23,7 +23,7 @@ fn record(condition: Condition) -> Record {
         .unwrap()
 }
 
-/// Duration of the response to a step of e, including the second in which its end is detected, s.
+/// Duration (in s) of the response to a step in e, including the second in which its end is detected.
 const RESPONSE_S: f64 = 4.0;
 
 /// Kind of constant signals.
@@ -111,7 +111,7 @@ fn track_through_constant_span(
     let (mut initial_bars, before) = (kept.unwrap_or_else(|| error_bars(&tracker)), at(first - 1));
     let mut reported = Vec::new();
     for k in 0..(length_s / ts) as usize {
-        // After a step of e, the response contains information as long as it is not constant.
+        // After a step in e, the response contains information as long as it is not constant.
         if span_kind == ConstantSpan::ConstantE && k as f64 * ts <= RESPONSE_S {
             initial_bars = error_bars(&tracker);
         }

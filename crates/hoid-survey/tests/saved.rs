@@ -23,7 +23,7 @@ fn record() -> Record {
         .unwrap()
 }
 
-/// After a stop in the middle of a run, every method and rule of forgetting gives bit-identical results.
+/// After a stop in the middle of a run, every method and every forgetting rule gives bit-identical results.
 #[test]
 fn restored_tracker_is_bit_identical() {
     let record = record();

@@ -61,7 +61,7 @@ fn vaf_of_a_constant_trace_matches_its_model() {
     }
 }
 
-/// Without remnant the best P explains nearly all of the second run, but a P that is too large or too small does not.
+/// The candidate P that explains the largest share of the second run is chosen; this share is above 80 %.
 #[test]
 fn best_covariance_of_the_grid_is_chosen() {
     let (record, other) = (run(0.1, 3), run(0.1, 4));
@@ -122,7 +122,8 @@ fn invalid_choices_are_refused_with_advice() {
     assert!(refusal(&other, &gradient).contains("has P"));
     let tracked = options(Method::rpem()).with(&[("track_delay", "0.2..0.4")]).unwrap();
     assert!(refusal(&other, &tracked).contains("without track_delay"));
-    // Second runs with another sample time, too few samples, the sign of u inverted, or only zeros.
+    // A second run is refused if it has another sample time, too few samples, the sign of u inverted, only zeros, or no
+    // input.
     let (e, u) = (other.input().to_vec(), other.output().to_vec());
     let of = |ts: f64, e: &[f64], u: Vec<f64>| {
         let (e, u) = (Channel::new("e", "", e.to_vec()), Channel::new("u", "", u));

@@ -1,4 +1,4 @@
-//! Change of a person as reported by a method, and the published baseline for the detection of changes.
+//! Change in a person as reported by a method, and the published baseline for the detection of changes.
 //!
 //! The baseline uses only the signals of the loop: an adaptation is assumed to be needed while the tracking error or
 //! its rate exceeds k of its standard deviations before the change (R. A. Hess, *Journal of Guidance, Control, and
@@ -10,10 +10,10 @@ use hoid_numerics::statistics::{mean, sample_variance};
 
 use crate::further_input::FurtherOperator;
 
-/// A change of the person that was declared.
+/// A declared change in the person.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Change {
-    /// Time from the change of the person to its declaration, s. For `adaptive` its resolution is half a second.
+    /// Time from the change in the person to its declaration, s. For `adaptive` its resolution is half a second.
     pub seconds_ago: f64,
     /// For `adaptive`, -ln p of the change test; for `multiple-model`, the logarithm of the odds of a change within the
     /// last four seconds.
@@ -26,23 +26,23 @@ pub struct Change {
     pub omega_nm_rad_s: [Estimate; 2],
     /// zeta_nm before and after the change.
     pub zeta_nm: [Estimate; 2],
-    /// Delay tau_e before and after the change, s; both values are equal if the delay is known.
+    /// Delay tau_e before and after the change (in s); both values are equal if the delay is known.
     pub tau_e_s: [Estimate; 2],
     /// T_L before and after the change, s.
     pub t_l_s: [f64; 2],
     /// Innovation variance before and after the change.
     pub innovation_variance: [f64; 2],
-    /// Changes of K_e, K_e_dot, omega_nm, zeta_nm, the logarithm of the innovation variance and tau_e, each divided by
+    /// Changes in K_e, K_e_dot, omega_nm, zeta_nm, the logarithm of the innovation variance and tau_e, each divided by
     /// its standard error.
     pub z: [f64; 6],
     /// True if the response to e was tested as a whole and changed, even if no single quantity changed by two standard
     /// errors.
     pub of_operator: bool,
-    /// Change of the response to a further input, for a model with one.
+    /// Change in the response to a further input, for a model with one.
     pub further: Option<FurtherChange>,
 }
 
-/// Change of the response to a further input.
+/// Change in the response to a further input.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FurtherChange {
     /// The response before and after the change.
@@ -54,8 +54,8 @@ pub struct FurtherChange {
 }
 
 impl FurtherChange {
-    /// Returns the names of the quantities that changed by more than two standard errors; if the response changed and
-    /// none of its quantities changed by so much, `response_f`.
+    /// Returns the names of the quantities that changed by more than two standard errors; if the response changed but
+    /// none of its quantities changed by that much, `response_f`.
     pub fn changed_quantities(&self) -> Vec<&'static str> {
         let each = FurtherOperator::NAMES.into_iter().zip(self.z);
         let named: Vec<&str> = each
@@ -69,7 +69,7 @@ impl FurtherChange {
     }
 }
 
-/// Change of a quantity, in standard errors, beyond which the quantity counts as changed.
+/// Change in a quantity, in standard errors, beyond which the quantity counts as changed.
 const SIGNIFICANT_CHANGE: f64 = 2.0;
 /// Names of the quantities of [`Change::z`].
 const QUANTITY_NAMES: [&str; 6] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", REMNANT, "tau_e"];
@@ -77,14 +77,14 @@ const REMNANT: &str = "remnant";
 
 impl Change {
     /// Returns `1/(1 + exp(-odds))`: the posterior probability of a change for `multiple-model`, but only `1/(1 + p)`
-    /// for `adaptive`.
+    /// with the p-value p of the test, which is not a probability of a change, for `adaptive`.
     pub fn probability(&self) -> f64 {
         1.0 / (1.0 + (-self.odds).exp())
     }
 
     /// Returns the names of the quantities that changed by more than two standard errors: `K_e`, `K_e_dot`, `omega_nm`,
-    /// `zeta_nm`, `remnant`, `tau_e`, and for a further input `K_f`, `K_f_dot`, `tau_f`. If the response to e changed as
-    /// a whole and none of its quantities changed by so much, it is named: `response` (`response_f` for a further
+    /// `zeta_nm`, `remnant`, `tau_e`, and for a further input `K_f`, `K_f_dot`, `tau_f`. If the response to e changed
+    /// as a whole but none of its quantities changed by that much, the name is `response` (`response_f` for a further
     /// input).
     pub fn changed_quantities(&self) -> Vec<&'static str> {
         let each = || {
@@ -158,7 +158,7 @@ mod tests {
     #[test]
     fn threshold_statistic_is_the_distance_in_standard_deviations() {
         let ts = SampleTime::AT_100_HZ;
-        // Mean of the error 0, variance 8/7; its rates are +-200.
+        // The error has the mean 0 and the variance 8/7; its rates are +-200.
         let error = [1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0];
         let mut baseline = ErrorThreshold::new(&error, ts).unwrap();
         let deviation = (8.0_f64 / 7.0).sqrt();

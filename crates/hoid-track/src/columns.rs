@@ -11,7 +11,7 @@ use crate::{FurtherOperator, OPERATOR_COLUMNS, OpenLoop, Response, Trace};
 pub type Columns = Vec<(String, Vec<f64>)>;
 
 impl Trace {
-    /// Returns for every row the operator, or the reason why there is none.
+    /// Returns the operator of every row, or the reason why there is none.
     pub fn operators(&self) -> Vec<Result<OperatorEstimate, NotConvertible>> {
         (0..self.len()).map(|row| self.operator(row)).collect()
     }
@@ -26,12 +26,12 @@ impl Trace {
         names
     }
 
-    /// Returns `t`, each coefficient, each parameter of the operator, for methods that estimate it those of the response
-    /// to a further input r (`K_f[r]`, `K_f_dot[r]`, `tau_f[r]`), gain in dB and phase in degrees at the
-    /// frequencies of the options (`gain_db@2.5`, `phase_deg@2.5`; for a further input r also `gain_db[r]@2.5`,
-    /// `phase_deg[r]@2.5`), and with a controlled element `crossover_rad_s` and
-    /// `phase_margin_deg`. Each of these columns except `t` is followed by its standard error (`_se`). NaN marks a
-    /// missing operator, crossover or standard error. `operators` is the result of [`Trace::operators`].
+    /// Returns `t`, each coefficient, each parameter of the operator, for methods that estimate them the parameters of
+    /// the response to a further input r (`K_f[r]`, `K_f_dot[r]`, `tau_f[r]`), the gain in dB and the phase in degrees
+    /// at the frequencies of the options (`gain_db@2.5`, `phase_deg@2.5`; for a further input r also `gain_db[r]@2.5`,
+    /// `phase_deg[r]@2.5`), and with a controlled element `crossover_rad_s` and `phase_margin_deg`. Each of these
+    /// columns except `t` is followed by its standard error (`_se`). NaN marks a missing operator, crossover or
+    /// standard error. `operators` is the result of [`Trace::operators`].
     pub fn estimate_columns(&self, operators: &[Result<OperatorEstimate, NotConvertible>]) -> Columns {
         let mut columns: Columns = vec![("t".to_owned(), self.times_s().to_vec())];
         let mut add = |name: &str, estimates: &[Option<Estimate>]| {

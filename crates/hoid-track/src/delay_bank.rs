@@ -16,8 +16,8 @@
 //! uniformly distributed between two samples, `Ts^2/12`.
 //!
 //! Before there is any evidence, the delay is distributed about the delay of the start,
-//! `L_k = -(tau_k - tau_start)^2/(2 s^2)` with s = 0.03 s; this prior fades like all evidence. Innovations count with
-//! at most [`INNOVATION_LIMIT`] standard deviations, so a single outlier does not decide. While the estimate is kept
+//! `L_k = -(tau_k - tau_start)^2/(2 s^2)` with s = 0.03 s; this prior fades like all evidence. Innovations are limited
+//! to [`INNOVATION_LIMIT`] standard deviations, so a single outlier does not decide. While the estimate is kept
 //! constant, the evidence is not updated, because all recursions except one then have coefficients that belong to
 //! another delay.
 

@@ -72,7 +72,7 @@ impl Trace {
         further_determinations(before, operator)
     }
 
-    /// Returns for each parameter of the operator a column, such as `K_e_determined`, with 1 in each row in which the
+    /// Returns a column for each parameter of the operator, such as `K_e_determined`, with 1 in each row in which the
     /// parameter is determined and 0 in the others. There are no columns for methods that need a start fit.
     pub fn determined_columns(
         &self,

@@ -7,7 +7,7 @@ use crate::{
 };
 
 impl TrackOptions {
-    /// Returns the rule of forgetting and the memory of the recursion as text.
+    /// Returns the forgetting rule and the memory of the recursion as text.
     pub fn memory_as_text(&self, sample_time: SampleTime) -> String {
         let method = &self.method;
         if let Some(words) = method.memory_as_text() {

@@ -1,4 +1,4 @@
-//! Rules of forgetting.
+//! Forgetting rules.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use hoid_ident::{
     settings::{Bounds, Kind, Setting, Settings, Value},
 };
 
-/// Default rate of the rule normalised gradient.
+/// Default rate of the normalised gradient.
 const DEFAULT_RATE: f64 = 0.1;
 
 /// Names of the rules.
@@ -20,7 +20,7 @@ const RULE_NAMES: [&str; 6] = [
     "gradient",
 ];
 
-/// Rule of forgetting of a recursion.
+/// Forgetting rule of a recursion.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum ForgettingRule {
     /// One forgetting factor for each parameter; a scalar factor if all memories are equal.

@@ -58,7 +58,7 @@ pub struct FurtherOperator {
     pub k_f: Estimate,
     /// Gain of the rate of the input, s.
     pub k_f_dot: Estimate,
-    /// Delay relative to the input as recorded, s; negative for a person who uses a preview.
+    /// Delay relative to the input as recorded (in s); negative for a person who uses a preview.
     pub tau_f_s: Estimate,
 }
 
@@ -79,7 +79,8 @@ pub struct TrackedInput {
     pub channel: String,
     /// Its role in the task of the person.
     pub role: ChannelRole,
-    /// Time by which the person sees the channel ahead, s: the model has the channel advanced by this time as its input.
+    /// Time by which the person sees the channel ahead (in s): the model has the channel advanced by this time as its
+    /// input.
     pub preview_s: f64,
     /// Numbers of coefficients of B and F, and the delay in samples.
     pub orders: InputOrders,

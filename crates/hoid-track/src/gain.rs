@@ -27,7 +27,7 @@ const EARLY_FORGETTING: f64 = 0.01;
 const EARLY_DECAY: f64 = 0.9993;
 /// Smallest factor of variable forgetting: a memory of ten samples.
 const MIN_FORGETTING_FACTOR: f64 = 0.9;
-/// Longest sliding window, samples; each sample takes as many numbers as there are parameters, plus one.
+/// Longest sliding window (in samples); each sample takes as many numbers as there are parameters, plus one.
 const MAX_WINDOW_SAMPLES: f64 = 1e7;
 /// Memory length of the innovation variance, as a multiple of the shortest memory of a parameter.
 const VARIANCE_MEMORY_RATIO: f64 = 4.0;

@@ -57,7 +57,7 @@ pub fn idle_head(record: &Record) -> usize {
     }
 }
 
-/// Returns the default span of the start fit, s: the first third after the idle head.
+/// Returns the default span of the start fit (in s): the first third after the idle head.
 pub fn default_start_span(record: &Record) -> (f64, f64) {
     let head = match idle_head(record) {
         all if all >= record.len() => 0,

@@ -1,9 +1,9 @@
 //! The recursions of the real-time kernel with the interface of all recursions, which adds capacity for the parameters,
 //! the delay lines, and the covariance in units of the parameters.
 //!
-//! Least squares with a further input is the prediction-error method of a model without C, D and F: without them the two
-//! are the same recursion. At a sample at which the further input is not known, its last value enters the filters and
-//! the estimate stays constant.
+//! Least squares with a further input is the prediction-error method of a model without C, D and F: without them the
+//! two are the same recursion. At a sample at which the further input is not known, its last value enters the filters
+//! and the estimate stays constant.
 
 use hoid_core::{
     adaptation::Adaptation,

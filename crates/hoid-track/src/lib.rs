@@ -5,7 +5,7 @@
 //! `theta(t) = theta(t-1) + P(t) psi(t) eps(t)`,
 //!
 //! and forgets the past, so it can follow changes (L. Ljung, *System Identification*, 1999, chapter 11). The methods
-//! differ in psi, in the parameters theta, and in their prior for the change of the person.
+//! differ in psi, in the parameters theta, and in their prior for the changes in the person.
 //!
 //! ```
 //! use hoid_model::scenario::{Condition, Scenario};
@@ -47,7 +47,7 @@
 //! | `determined` | parameters that the data determine |
 //! | `delay_bank` | tracking of a delay in whole samples, with any recursion |
 //! | `validation` | prediction of another run by a trace; choice of the initial covariance by this measure |
-//! | `change` | [`Change`]: a declared change of a person |
+//! | `change` | [`Change`]: a declared change in a person |
 //!
 //! **A recursion starts from the available knowledge.** For methods with a start fit this is by default the batch fit
 //! of the first third of a record, with the covariance of that fit. Until the end of that span only the filters are

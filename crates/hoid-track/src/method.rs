@@ -66,7 +66,7 @@ impl<M: RecursiveMethod + Clone + PartialEq + 'static> MethodObject for M {
 
 /// A recursive method with its options.
 pub trait RecursiveMethod: Settings + MethodObject + 'static {
-    /// Returns name and description of the method.
+    /// Returns the name and description of the method.
     fn description(&self) -> MethodDescription;
 
     /// Returns the earlier name of the method; `None` if no earlier name is accepted.
@@ -123,7 +123,7 @@ pub trait RecursiveMethod: Settings + MethodObject + 'static {
         false
     }
 
-    /// Lag of the basis in which the gains are estimated, s; `None` without a basis.
+    /// Lag of the basis in which the gains are estimated (in s); `None` without a basis.
     fn basis_lag_s(&self) -> Option<f64> {
         None
     }
@@ -166,7 +166,7 @@ pub trait RecursiveMethod: Settings + MethodObject + 'static {
         self.gain().map(|gain| &gain.memories)
     }
 
-    /// Returns the rule of forgetting.
+    /// Returns the forgetting rule.
     fn forgetting(&self) -> ForgettingRule {
         self.gain()
             .map_or(ForgettingRule::Exponential, |gain| gain.forgetting.clone())
@@ -208,7 +208,7 @@ pub trait RecursiveMethod: Settings + MethodObject + 'static {
         BTreeMap::new()
     }
 
-    /// Returns the range of the tracked delay tau_e, s; `None` if the delay is not tracked.
+    /// Returns the range of the tracked delay tau_e (in s); `None` if the delay is not tracked.
     fn track_delay_s(&self) -> Option<(f64, f64)> {
         None
     }
@@ -238,7 +238,7 @@ pub trait RecursiveMethod: Settings + MethodObject + 'static {
         None
     }
 
-    /// Prior standard deviation of the delay of a further input, s, for methods with a prior.
+    /// Prior standard deviation of the delay of a further input (in s), for methods with a prior.
     fn further_delay_deviation(&self, _further: &TrackedInput, _sample_time: SampleTime) -> Option<f64> {
         None
     }
@@ -255,7 +255,7 @@ pub trait RecursiveMethod: Settings + MethodObject + 'static {
     fn retain(&mut self, _known: &dyn Fn(&str) -> bool) {}
 }
 
-/// Returns name, description and options of a method.
+/// Returns the name, description and options of a method.
 pub fn spec(method: &dyn RecursiveMethod) -> MethodSpec {
     let about = method.description();
     let own = |setting: Setting| match about.defaults.iter().find(|(name, _)| *name == setting.name) {

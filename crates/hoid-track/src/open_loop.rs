@@ -2,7 +2,7 @@
 //!
 //! `L(omega) = Y(omega) Y_c(j omega)`, where Y is the sampled response of the estimate. The crossover and its
 //! sensitivity to `dL/L` are computed as for batch fits ([`Crossover`]); `dL/L = dY/Y`, whose covariance follows from
-//! the covariance of the real and imaginary part of the response at the crossover.
+//! the covariance of the real and imaginary parts of the response at the crossover.
 //!
 //! Nothing is reported if |L| does not fall through one, or if the standard error of the crossover is more than half of
 //! the crossover: the first-order error is then meaningless.
@@ -20,7 +20,7 @@ const MAX_CROSSOVER_ERROR: f64 = 0.5;
 pub struct OpenLoop {
     /// Crossover frequency, rad/s.
     pub crossover_rad_s: Estimate,
-    /// Phase margin, deg, between -180 and 180.
+    /// Phase margin (in deg), between -180 and 180.
     pub phase_margin_deg: Estimate,
 }
 
@@ -50,8 +50,8 @@ impl OpenLoop {
     /// Number of values in a packed crossover and margin.
     pub(crate) const PACKED_LEN: usize = 4;
 
-    /// Computes crossover and phase margin of an estimate; `value` returns its response at a frequency, and `whole` the
-    /// response with its covariance.
+    /// Computes the crossover and phase margin of an estimate; `value` returns its response at a frequency, and `whole`
+    /// the response with its covariance.
     pub(crate) fn of(
         value: impl Fn(f64) -> Option<[f64; 2]>,
         whole: impl Fn(f64) -> Option<Response>,
@@ -69,7 +69,7 @@ impl OpenLoop {
         let found = Crossover::find_lowest(open_loop, sample_time).ok_or(NoCrossover::NeverFalls)?;
         let there = whole(found.omega_rad_s).ok_or(NoCrossover::NoEstimate)?;
         let [re, im] = there.value;
-        // dY/Y for a unit change of the real part of Y, and for one of the imaginary part.
+        // dY/Y for a unit change in the real part of Y, and for one in the imaginary part.
         let moved =
             [Complex64::new(1.0, 0.0), Complex64::new(0.0, 1.0)].map(|d| found.shift_for(d / Complex64::new(re, im)));
         let estimate = |value: f64, of: usize| {

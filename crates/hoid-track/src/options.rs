@@ -33,7 +33,7 @@ pub struct TrackOptions {
     pub further: Option<TrackedInput>,
     /// Start of the recursion. Default: a batch fit of the first third of the record.
     pub start: StartSource,
-    /// Time from which the estimate is updated, s; before it, only the filters are updated. Default: the end of the
+    /// Time from which the estimate is updated (in s); before it, only the filters are updated. Default: the end of the
     /// start span if P comes from the fit of this span, otherwise the start of the record.
     pub update_from_s: Option<f64>,
     /// Limits of the search in start fits and in fits of windows.
@@ -96,7 +96,7 @@ impl TrackOptions {
         }
     }
 
-    /// Returns the span of the start fit in a record, s; `None` without a start fit.
+    /// Returns the span of the start fit in a record (in s); `None` without a start fit.
     pub fn start_span(&self, record: &Record) -> Option<(f64, f64)> {
         let StartSource::Span(span) = self.start else {
             return None;
@@ -110,7 +110,7 @@ impl TrackOptions {
         method.track_delay_s().filter(|_| method.delay_is_parameter())
     }
 
-    /// Returns the lag of the basis of a method with a basis, s, if its model has one input: the tests of form and
+    /// Returns the lag of the basis of a method with a basis (in s), if its model has one input: the tests of form and
     /// constancy of the response examine the response to e alone.
     pub(crate) fn basis_lag_of_one_input_s(&self) -> Option<f64> {
         self.method.basis_lag_s().filter(|_| self.further.is_none())

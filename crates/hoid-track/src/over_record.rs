@@ -25,7 +25,7 @@ pub fn track(record: &Record, options: &TrackOptions, every: usize) -> Result<Tr
     track_from(record, options, every, None)
 }
 
-/// As [`track`], with a given fit of the start span by [`TrackOptions::start_estimator`], so several methods with the
+/// Like [`track`], with a given fit of the start span by [`TrackOptions::start_estimator`], so several methods with the
 /// same start need this fit only once.
 ///
 /// # Errors
@@ -39,7 +39,7 @@ pub fn track_from(
     track_with(record, options, every, start, &mut |_, _| {})
 }
 
-/// As [`track_from`]; after every sample, `each` is called with the tracker and the index of the sample.
+/// Like [`track_from`]; after every sample, `each` is called with the tracker and the index of the sample.
 pub(crate) fn track_with(
     record: &Record,
     options: &TrackOptions,

@@ -56,7 +56,7 @@ impl PersonPrior {
         }
     }
 
-    /// Returns the delay that the prior specifies, s; `None` if it specifies none.
+    /// Returns the delay that the prior specifies (in s); `None` if it specifies none.
     pub(crate) fn delay_s(&self) -> Option<f64> {
         match self.fit() {
             Some(fit) => Some(fit.operator.tau_e_s()),

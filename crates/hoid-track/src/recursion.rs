@@ -50,7 +50,7 @@ pub trait Recursion: State + Send + Sync {
     fn step(&mut self, sample: Sample) -> StepOutcome;
     /// Takes a sample into the filters only; the estimate stays constant.
     fn step_without_update(&mut self, sample: Sample) -> StepOutcome;
-    /// As `step_without_update`, for a missing output, which the one-step prediction replaces.
+    /// Like `step_without_update`, for a missing output, which the one-step prediction replaces.
     fn bridge(&mut self, sample: Sample);
     /// Returns theta in the order of [`hoid_model::Orders::parameter_names`].
     fn theta(&self) -> &[f64];
@@ -78,7 +78,7 @@ pub trait Recursion: State + Send + Sync {
     fn response(&self, _omega_rad_s: f64) -> Option<Response> {
         None
     }
-    /// Returns the real and imaginary part of the response at a frequency in rad/s, without covariance, if it differs
+    /// Returns the real and imaginary parts of the response at a frequency in rad/s, without covariance, if it differs
     /// from the response of the polynomials.
     fn response_value(&self, _omega_rad_s: f64) -> Option<[f64; 2]> {
         None

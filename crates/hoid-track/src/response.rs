@@ -4,9 +4,9 @@
 //!
 //! `dH/db_j = z^-(nk+j)/(A F)`, `dH/da_j = -H z^-j/A`, `dH/df_j = -H z^-j/F`,
 //!
-//! so that the covariance of theta gives the covariance of the real and the imaginary part. The errors of gain and
-//! phase follow to first order: `d ln H = dH/H`, whose real part is the relative change of the gain and whose imaginary
-//! part is the change of the phase.
+//! so that the covariance of theta gives the covariance of the real and imaginary parts. The errors of gain and phase
+//! follow to first order: `d ln H = dH/H`, whose real part is the relative change in the gain and whose imaginary part
+//! is the change in the phase.
 
 use hoid_model::{Orders, SampleTime, uncertainty::Estimate};
 
@@ -16,9 +16,9 @@ const DB: f64 = 8.685_889_638_065_037;
 /// Response at a frequency.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Response {
-    /// Real and imaginary part.
+    /// Real and imaginary parts.
     pub value: [f64; 2],
-    /// Covariance of the real and imaginary part; NaN if there is none.
+    /// Covariance of the real and imaginary parts; NaN if there is none.
     pub covariance: [[f64; 2]; 2],
 }
 
@@ -26,7 +26,7 @@ impl Response {
     /// Number of values of a packed response.
     pub(crate) const PACKED_LEN: usize = 5;
 
-    /// Packs the real and imaginary part, and the upper triangle of their covariance.
+    /// Packs the real and imaginary parts, and the upper triangle of their covariance.
     pub(crate) fn pack(&self) -> [f64; Self::PACKED_LEN] {
         let ([re, im], [[a, b], [_, c]]) = (self.value, self.covariance);
         [re, im, a, b, c]
@@ -81,7 +81,7 @@ impl Response {
         (a * a * c[0][0] + 2.0 * a * b * c[0][1] + b * b * c[1][1]) / (square * square)
     }
 
-    /// Covariance of the real and imaginary part of `dH/H`; `None` if there is none.
+    /// Covariance of the real and imaginary parts of `dH/H`; `None` if there is none.
     pub(crate) fn relative_covariance(&self) -> Option<[[f64; 2]; 2]> {
         let [re, im] = self.value;
         let (real, imaginary) = (self.variance_along([re, im]), self.variance_along([-im, re]));
@@ -94,7 +94,8 @@ impl Response {
             .then_some([[real, cross], [cross, imaginary]])
     }
 
-    /// Returns the real and imaginary part of the response of polynomials with the coefficients theta and these orders.
+    /// Returns the real and imaginary parts of the response of polynomials with the coefficients theta and these
+    /// orders.
     pub(crate) fn polynomial_response_value(
         orders: &Orders,
         theta: &[f64],
@@ -117,7 +118,7 @@ impl Response {
             sum([1.0, 0.0], &theta[..o.na]),
             sum([1.0, 0.0], &theta[first_f..first_f + o.nf]),
         );
-        // B has no constant coefficient of its own: b_0 is multiplied by q^-nk.
+        // B has no constant coefficient: b_0 is multiplied by q^-nk.
         let b = sum([0.0; 2], &theta[first_b..first_b + o.nb]);
         let (sin, cos) = (-omega_rad_s * sample_time.s() * (o.nk as f64 - 1.0)).sin_cos();
         complex_quotient(complex_product(b, [cos, sin]), complex_product(a, f))

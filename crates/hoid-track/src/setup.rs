@@ -14,7 +14,7 @@ pub(crate) const PHYSICAL_NAMES: [&str; 5] = ["K_e", "K_e_dot", "omega_nm", "zet
 /// Start of the recursion.
 #[derive(Debug, Clone, PartialEq)]
 pub enum StartSource {
-    /// From a batch fit of this span of the record, s; `None` for the first third.
+    /// From a batch fit of this span of the record (in s); `None` for the first third.
     Span(Option<(f64, f64)>),
     /// From this theta, in the order of [`Orders::parameter_names`].
     Theta(Vec<f64>),
@@ -37,7 +37,7 @@ pub struct Setup {
     pub search: SearchOptions,
     /// Names of the estimated parameters, each with its memory.
     pub memories: Vec<(String, Memory)>,
-    /// Rule of forgetting.
+    /// Forgetting rule.
     pub forgetting: ForgettingRule,
     /// P at the start as a multiple of the unit matrix; `None` for the covariance of the start fit.
     pub covariance: Option<f64>,

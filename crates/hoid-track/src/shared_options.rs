@@ -68,7 +68,7 @@ settings! {
     groups {
         /// Memory lengths of the parameters.
         pub memories: MemoryOptions,
-        /// Rule of forgetting.
+        /// Forgetting rule.
         pub forgetting: ForgettingRule,
     }
 }

@@ -21,7 +21,7 @@ const RETRY_DIVISOR: usize = 4;
 const MAX_KEPT_LENGTHS: usize = 2;
 /// Index, in the numbers of a saved warm-up, of the number of kept samples.
 const COUNT_INDEX: usize = 4;
-/// Longest run of faulty samples within a warm-up, s; after a longer one the warm-up restarts.
+/// Longest run of faulty samples within a warm-up (in s); after a longer one the warm-up restarts.
 const LONGEST_FAULT_S: f64 = 1.0;
 
 /// Stage of a live recursion.

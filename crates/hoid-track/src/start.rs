@@ -29,9 +29,11 @@ const TYPICAL_D1: f64 = -0.8;
 const MIN_OMEGA_RAD_S: f64 = 0.5;
 const MAX_OMEGA_NYQUIST_SHARE: f64 = 0.5;
 const DAMPING_RANGE: [f64; 2] = [0.02, 5.0];
-/// Longest sample time of a tracker, s: with a longer one, the upper bound of omega_nm would be below the lower bound.
+/// Longest sample time of a tracker (in s): with a longer one, the upper bound of omega_nm would be below the lower
+/// bound.
 const LONGEST_SAMPLE_TIME_S: f64 = MAX_OMEGA_NYQUIST_SHARE * std::f64::consts::PI / MIN_OMEGA_RAD_S;
-/// Shortest sample time of a tracker, s: with a shorter one, the samples that a tracker stores would not fit in memory.
+/// Shortest sample time of a tracker (in s): with a shorter one, the samples that a tracker stores would not fit in
+/// memory.
 const SHORTEST_SAMPLE_TIME_S: f64 = 1e-6;
 /// Factor by which the roots of an unstable noise model are moved inwards until it is stable.
 const ROOT_SHRINK_FACTOR: f64 = 0.99;
@@ -220,7 +222,7 @@ pub fn physical_bounds<const N: usize>(setup: &Setup, sample_time: SampleTime) -
     Ok(std::array::from_fn(|i| limits.get(i).copied().unwrap_or(free)))
 }
 
-/// Returns the lower and upper bound of each physical parameter and of c and d.
+/// Returns the lower and upper bounds of each physical parameter and of c and d.
 ///
 /// # Errors
 /// [`IdentError::UnknownParameter`], [`IdentError::BadOption`].
@@ -445,7 +447,7 @@ fn from_grey_box(setup: &Setup, record: &Record) -> Result<FittedStart, IdentErr
     let operator = if setup.delay_parameter_s.is_some() { 5 } else { 4 };
     let fit = found.polynomial_fit(0).clone();
     // The remnant of the grey box has one pole. If D must have more poles, it is fitted to the residual of the
-    // operator: a D of too low an order leaves the innovations coloured, and a bank of hypotheses takes coloured
+    // operator: a D of too low an order leaves the innovations coloured, and a bank of hypotheses mistakes coloured
     // innovations for changes.
     let noise = if o.nd > 1 {
         StartNoise::of(&fit, record, o.nd)

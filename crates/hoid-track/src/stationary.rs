@@ -14,7 +14,8 @@
 //!   distance from the value at the start of the block. Before ten blocks are known, a span is stationary only if all
 //!   its values are equal.
 //! - There is **no information** if both e and u are stationary for [`MIN_STATIONARY_BOTH_S`], or one of the two for
-//!   [`MIN_STATIONARY_ONE_S`]: a frozen channel, or a resting hand, whose response cannot be distinguished from no response.
+//!   [`MIN_STATIONARY_ONE_S`]: a frozen channel, or a resting hand, which cannot be distinguished from a hand that does
+//!   not respond.
 //! - The recursion is then restored exactly to its state before the first sample of the span (or before a jump to the
 //!   value of the span): a stored state is restored, and the recursion takes the samples from then on again. Estimate,
 //!   covariance and innovation variance keep their values of that time for the whole span.
@@ -33,8 +34,8 @@ use crate::{
 
 /// Share of its typical size within which a signal is stationary.
 const STATIONARY_SHARE: f64 = 0.02;
-/// Shortest stationary span of both signals, and of one signal, that carries no information, s, and the smallest number
-/// of samples of a stationary span.
+/// Shortest stationary spans (in s) of both signals and of one signal that carry no information, and the smallest
+/// number of samples in a stationary span.
 pub(crate) const MIN_STATIONARY_BOTH_S: f64 = 1.0;
 const MIN_STATIONARY_ONE_S: f64 = 5.0;
 const MIN_SAMPLES: u64 = 20;

@@ -273,7 +273,8 @@ impl Trace {
         Response::unpack(&self.responses[from..from + Response::PACKED_LEN])
     }
 
-    /// Returns the response of the polynomials of a row at a frequency in rad/s, for methods that have no other response.
+    /// Returns the response of the polynomials of a row at a frequency in rad/s, for methods that have no other
+    /// response.
     pub fn response_at(&self, row: usize, omega_rad_s: f64) -> Response {
         let covariance = self.covariance(row);
         let (theta, whole) = self.options.first_input_part(self.theta(row), covariance.as_deref());
@@ -317,7 +318,7 @@ impl Trace {
         self.loop_shape.as_ref()
     }
 
-    /// Returns crossover and phase margin of a row with the controlled element of the options; `None` without a
+    /// Returns the crossover and phase margin of a row with the controlled element of the options; `None` without a
     /// controlled element.
     pub fn open_loop(&self, row: usize) -> Option<Result<OpenLoop, NoCrossover>> {
         let element = self.options.controlled_element.as_ref()?;
@@ -342,7 +343,7 @@ impl Trace {
         &self.innovation_variance
     }
 
-    /// Returns for each row the number of steps up to this row that stability or a bound shortened.
+    /// Returns the number of steps up to each row that stability or a bound shortened.
     pub fn steps_shortened(&self) -> &[u64] {
         &self.shortened
     }
@@ -369,8 +370,8 @@ impl Trace {
         &self.faults
     }
 
-    /// Returns for each row the number of samples up to this row that the guard held back, or during which it kept the
-    /// estimate constant.
+    /// Returns the number of samples up to each row that the guard held back, or during which it kept the estimate
+    /// constant.
     pub fn held_counts(&self) -> &[u64] {
         &self.held
     }
@@ -410,7 +411,7 @@ impl Trace {
         self.averaged
     }
 
-    /// Returns the delay of the rows due to the moving average, s: half its length.
+    /// Returns the delay of the rows due to the moving average (in s): half its length.
     pub fn averaging_delay_s(&self) -> f64 {
         (self.averaged - 1) as f64 / 2.0 * self.every as f64 * self.sample_time.s()
     }

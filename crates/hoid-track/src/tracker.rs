@@ -26,11 +26,12 @@ use crate::{
 
 /// Frequency at which the sign of a response is examined, rad/s.
 const SIGN_CHECK_RAD_S: f64 = 0.5;
-/// Frequencies at which the error of the response is examined, rad/s, and the standard error in dB below which a
-/// response is known.
+/// Frequencies (in rad/s) at which the error of the response is examined, and the standard error in dB below which a
+/// response counts as known.
 const ERROR_CHECK_RAD_S: [f64; 3] = [1.0, 2.0, 4.0];
 const MAX_KNOWN_ERROR_DB: f64 = 2.0;
-/// Range of the phase of people's responses at [`SIGN_CHECK_RAD_S`], deg: a lag and a delay give -110, two leads 70.
+/// Range of the phase of people's responses at [`SIGN_CHECK_RAD_S`] (in deg): a lag and a delay give -110, two leads
+/// 70.
 const PHASE_RANGE_DEG: (f64, f64) = (-120.0, 75.0);
 /// Smallest distance, in standard errors, of an implausible phase from the range of people's phases.
 const IMPLAUSIBLE_DISTANCE: f64 = 2.0;
@@ -71,7 +72,7 @@ impl Tracker {
         Self::from_fit(options, span, None, sample_time)
     }
 
-    /// As [`Tracker::new`], with the fit of the start span if it is known.
+    /// Like [`Tracker::new`], with the fit of the start span if it is known.
     pub(crate) fn from_fit(
         options: &TrackOptions,
         span: Option<&Record>,
@@ -188,7 +189,7 @@ impl Tracker {
                 .is_some_and(|stationary| stationary.is_paused())
     }
 
-    /// Returns the time since the last restart by the guard, s; `None` if there was none.
+    /// Returns the time since the last restart by the guard (in s); `None` if there was none.
     pub fn time_since_restart_s(&self) -> Option<f64> {
         self.guard.as_ref()?.time_since_restart_s()
     }
@@ -271,7 +272,7 @@ impl Tracker {
         Some(Response::from_polynomials(&orders, theta, whole, omega_rad_s, ts))
     }
 
-    /// Returns crossover and phase margin with the controlled element of the options; `None` without a controlled
+    /// Returns the crossover and phase margin with the controlled element of the options; `None` without a controlled
     /// element.
     pub fn open_loop(&self) -> Option<Result<OpenLoop, NoCrossover>> {
         let element = self.options.controlled_element.as_ref()?;

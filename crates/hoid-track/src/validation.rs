@@ -9,10 +9,10 @@
 //!
 //! `VAF = max(0, 1 - sum (u - w)^2/sum u^2) 100 %`,
 //!
-//! The initial covariance is `P_0 = p I`, with the p of a grid whose trace explains most of the second run. An estimate that follows
-//! the remnant of the first run explains less of the second run, which has another remnant; an estimate that changes
-//! too slowly explains less after a change of the person. The runs are aligned at their first samples, so changes of
-//! the task must occur at the same time in both runs.
+//! The initial covariance is `P_0 = p I`, with the p of a grid whose trace explains the second run best. An estimate
+//! that follows the remnant of the first run explains less of the second run, which has another remnant; an estimate
+//! that changes too slowly explains less after a change in the person. The runs are aligned at their first samples, so
+//! changes of the task must occur at the same time in both runs.
 //!
 //! [`track_validated`] follows the proposal literally: P is updated during the run. At regular times the current model
 //! and the model of one interval earlier are both simulated over the last few seconds of the second run; if the current
@@ -170,8 +170,8 @@ fn check_method(options: &TrackOptions) -> Result<(), IdentError> {
     Ok(())
 }
 
-/// Returns the options with the initial covariance whose trace of the record explains most of a second run; if two
-/// covariances explain the same, the smaller one is chosen.
+/// Returns the options with the initial covariance whose trace of the record explains a second run best; if two
+/// covariances explain it equally well, the smaller one is chosen.
 ///
 /// # Errors
 /// [`IdentError`] for a method without such a covariance, or if a covariance is given; the errors of [`track_from`] and
@@ -246,12 +246,12 @@ impl Default for CovarianceUpdates {
     }
 }
 
-/// As [`crate::track()`], with a covariance that is reduced when the estimate explains less of a second run than
+/// Like [`crate::track()`], with a covariance that is reduced when the estimate explains less of a second run than
 /// before.
 ///
 /// # Errors
-/// As [`crate::track()`]; [`IdentError`] for a method without such a covariance or with a tracked delay, and for a
-/// second run with another sample time, too few samples, or no input.
+/// The errors of [`crate::track()`]; [`IdentError`] for a method without such a covariance or with a tracked delay, and
+/// for a second run with another sample time, too few samples, or no input.
 pub fn track_validated(
     record: &Record,
     validation: &Record,

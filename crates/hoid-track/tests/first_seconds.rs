@@ -74,7 +74,7 @@ fn bands_have_nominal_coverage_in_the_first_seconds() {
         shares(&loops),
         loops.each_ref().map(|c| c.all)
     );
-    // Shares of 270 values, about six of which are correlated with each other: a standard error of 3 to 4 %.
+    // A share of 270 values in correlated groups of about six has a standard error of 3 to 4 %.
     for (share, at) in shares(&counts).into_iter().zip(TIMES_S) {
         assert!((0.85..=1.0).contains(&share), "{at} s: {share}");
     }

@@ -128,7 +128,7 @@ fn rpem(record: &Record, start: &[f64]) -> Vec<Vec<f64>> {
     (0..u.len()).map(step).collect()
 }
 
-/// Returns the largest difference of a coefficient over all rows.
+/// Returns the largest difference in a coefficient over all rows.
 fn difference(trace: &Trace, twin: &[Vec<f64>]) -> f64 {
     assert_eq!(trace.len(), twin.len());
     let of_row = |(k, row): (usize, &Vec<f64>)| {

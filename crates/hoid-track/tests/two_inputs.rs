@@ -1,4 +1,4 @@
-//! Recursions with a further input: comparison with the batch fit, a change of one response, and rejected options.
+//! Recursions with a further input: comparison with the batch fit, a change in one response, and rejected options.
 #![allow(clippy::unwrap_used)]
 
 use hoid_ident::{
@@ -357,14 +357,15 @@ fn default_tracker_follows_both_responses_and_names_the_input_that_changed() {
             .iter()
             .find(|finding| finding.kind == "changed-input");
         let note = note.map_or("", |note| note.message.as_str());
-        let said = note.contains("the response to r changed") && note.contains("no change of the response to e");
+        let said = note.contains("the response to r changed") && note.contains("no change in the response to e");
         named += usize::from(trace.changes().iter().any(named_r) && said);
     }
     assert!(named >= 5, "{named} of 6");
     assert!(inside + 2 >= count, "{inside} of {count}");
 }
 
-/// With little remnant a change of a response makes the innovations many times larger, as a fault of a channel would.
+/// With little remnant a change in a response makes the innovations many times larger, as a fault of a channel would,
+/// but it is followed.
 #[test]
 fn change_with_little_remnant_is_followed() {
     for seed in 0..6 {
@@ -408,7 +409,8 @@ fn preview_advances_the_further_input() {
         track(&original, &default_tracker(0.0), 100).unwrap(),
         track(&delayed, &default_tracker(preview_s), 100).unwrap(),
     );
-    // The person sees the same input, so the estimates are equal until the last samples, at which it is not known.
+    // The person sees the same input, so the estimates are equal until the last samples, at which the input is not
+    // known.
     let row = plain.len() - 2;
     assert_eq!(plain.theta(row), ahead.theta(row));
     let [one, other] = [&plain, &ahead].map(|trace| trace.further_operator(row).unwrap());

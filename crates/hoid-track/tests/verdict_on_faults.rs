@@ -30,7 +30,7 @@ fn tracked(record: &Record, options: &[(&str, &str)]) -> Trace {
     track(record, &options, 10).unwrap()
 }
 
-/// Returns the kinds of the findings that are no notes.
+/// Returns the kinds of the findings that are not notes.
 fn warning_kinds(trace: &Trace, record: &Record) -> Vec<&'static str> {
     let verdict = trace.verdict(record, None).unwrap();
     let found = verdict.findings().iter().filter(|f| f.severity != Severity::Note);
@@ -104,7 +104,8 @@ fn single_outlier_does_not_change_the_verdict() {
     }
 }
 
-/// u is zero, or e or u keeps its value, from 40.00 to 60.50 s.
+/// If u is zero, or e or u keeps its value, from 40.00 to 60.50 s, one fault with these times is found, and no change
+/// is declared.
 #[test]
 fn frozen_span_has_its_own_times_and_no_changes() {
     let clean = condition_1();
@@ -140,7 +141,8 @@ fn short_record_has_no_estimate() {
     );
 }
 
-/// A person with a lag of 8 s and the element `1/(s + 1)`.
+/// For a person with a lag of 8 s and the element `1/(s + 1)`, a finding reports the lag; with a prior of this lag
+/// there is no such finding.
 #[test]
 fn another_lag_is_named_with_a_prior_that_works() {
     for seed in 10..12 {

@@ -22,7 +22,7 @@ use fault_corpus::{
 };
 use rayon::prelude::*;
 
-/// Seed of the page; the tests have other seeds.
+/// Seed of the numbers in `research/notes/faults.md`; the tests have other seeds.
 const SEED: u64 = 2121;
 /// First number of the clean runs; no case with a fault has such a number.
 const FIRST_CLEAN_NUMBER: u64 = 100_000;

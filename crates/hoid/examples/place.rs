@@ -1,6 +1,6 @@
-//! Reads samples `e,u` from standard input. After each sample it prints the six parameters of the operator, crossover
-//! and phase margin, each with its standard error, and the processing time of the sample in ns. This is one of the
-//! places of `cargo xtask places`.
+//! Reads samples `e,u` from standard input. After each sample it prints the six parameters of the operator, the
+//! crossover frequency and the phase margin, each with its standard error, and the processing time of the sample in ns.
+//! This is one of the places of `cargo xtask places`.
 #![allow(clippy::print_stdout)]
 
 use std::{

@@ -42,7 +42,7 @@
 //! let simulator = Simulator::new(&Scenario::condition(Condition::C1))?;
 //! let record = simulator.run(RunSeed { seed: 1, ..RunSeed::default() }, false)?;
 //!
-//! // Options have types: two forms are compared, at the lines of the target and by prediction error.
+//! // Options are typed. Two forms are compared, at the lines of the target and by prediction error.
 //! let family = FamilyEstimator {
 //!     forms: vec![Form::Gain, Form::Lead],
 //!     excitation: Some("f_t".to_owned()),

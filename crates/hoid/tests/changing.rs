@@ -79,7 +79,7 @@ fn two_sided_estimate_is_closer_with_correct_bands() {
         let [before, after] = [&causal, &smooth].map(|all| rms_over_runs(all, 0, i));
         let covered = rms_over_runs(&smooth, 1, i);
         println!("{name}: {before:.4} {after:.4}, covered {covered:.3}");
-        // The page gives a ratio of .7 for K_e, T_L and K_e_dot; with twelve runs its standard error is a tenth.
+        // The expected ratio for K_e, T_L and K_e_dot is .7; with twelve runs its standard error is .1.
         assert!(after < if i < 3 { 0.85 } else { 1.1 } * before, "{name}");
         // With many runs, a coverage of 90 to 99 % is required; each of these twelve runs has only about three
         // independent errors.
@@ -153,7 +153,7 @@ fn change_of_delay_is_tracked_and_named() {
             assert!(error.abs() < 4.0 * se && se < 0.02, "{t}: {tau:?}");
         }
     }
-    // A start outside the tracked range, an invalid range, and two-sided estimates.
+    // A start outside the tracked range, an invalid range, and two-sided estimates are refused.
     let refused = |options: TrackOptions| {
         track(&run(Condition::C1, 1, 0.1, 0), &options, 8)
             .unwrap_err()

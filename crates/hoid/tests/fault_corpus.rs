@@ -17,7 +17,7 @@ use fault_corpus::{
 };
 use serde_json::json;
 
-/// Seed that differs from the seed of the page.
+/// Seed that differs from the seed of the numbers in `research/notes/faults.md`.
 const SEED: u64 = 77;
 
 fn two_runs() -> (Table, Table) {
@@ -299,8 +299,8 @@ fn every_wrong_result_is_flagged() {
     let silent: Vec<String> = all
         .iter()
         // Methods that are also wrong on clean runs are excluded, because the fault is not the cause: rls has its own
-        // noise model, and trackers with a start span of 13 s are wrong on some clean runs of people (the page gives
-        // the frequency).
+        // noise model, and trackers with a start span of 13 s are wrong on some clean runs of people
+        // (`research/notes/faults.md` gives the frequency).
         .filter(|o| o.way != EvaluationMethod::Rls && (o.who != OperatorKind::Person || !o.way.is_tracker()))
         .filter(|o| o.judged.is_silently_wrong())
         .map(|o| {

@@ -131,7 +131,7 @@ impl<'ast> Visit<'ast> for Paths<'_> {
     }
 }
 
-/// Returns the names of the types that a macro declares, or would declare if it was used.
+/// Returns the names of the types that a macro declares, or would declare if it were used.
 fn collect_declared_types(stream: TokenStream, found: &mut BTreeSet<String>) {
     let mut declares = false;
     for token in stream {
@@ -180,7 +180,7 @@ impl Crate {
         all
     }
 
-    /// `folder` is the folder of the files of child modules.
+    /// Adds a module; `folder` contains the files of its child modules.
     fn add_module(&mut self, file: &Path, folder: &Path, parent: Option<usize>, items: &[Item]) -> usize {
         let at = self.modules.len();
         self.modules.push(Module {

@@ -226,7 +226,7 @@ fn truth() -> [f64; 6] {
     [held.b0, held.f1, 0.09, 0.4, 11.25, 0.35]
 }
 
-/// Fits all runs, and prints bias, spread and median standard error in % of the true value.
+/// Fits all runs, and prints the bias, the spread and the median standard error in % of the true value.
 fn fit_all(label: &str, records: &[Record], fit: impl Fn(&Record) -> Result<Fit, IdentError>) -> Vec<Sample> {
     let mut samples: Vec<Sample> = PARAMETER_NAMES.iter().map(|_| Sample::new()).collect();
     let mut left_out = 0;

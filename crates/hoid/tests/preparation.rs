@@ -59,7 +59,7 @@ fn units_change_only_the_gains() {
     }))
     .operator()
     .unwrap();
-    // The search ends within 1e-12 of the loss, which gives an error of 1e-6 of a parameter.
+    // The search ends within 1e-12 of the minimum loss, which corresponds to a relative error of 1e-6 in a parameter.
     for (found, expected) in [
         (volts.k_e.value, 0.25 * plain.k_e.value),
         (volts.t_l_s.value, plain.t_l_s.value),

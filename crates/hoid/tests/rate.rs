@@ -27,8 +27,8 @@ fn run(hz: f64, noise_level: f64, seed: u64) -> Record {
 
 #[test]
 fn decimation_keeps_the_delay() {
-    // With a small remnant, a change of the delay of a millisecond is visible; the longer hold alone would change it by
-    // 2.7 to 4.8 ms.
+    // With a small remnant, a change of one millisecond in the delay is visible; the longer hold alone would change the
+    // delay by 2.7 to 4.8 ms.
     for (hz, factor) in [(250.0, 3), (1000.0, 10), (2000.0, 20)] {
         let (record, done) = Decimation::Auto.apply(run(hz, 0.001, 0)).unwrap();
         let done = done.unwrap();

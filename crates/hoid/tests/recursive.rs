@@ -330,7 +330,7 @@ fn invalid_samples_are_skipped_and_counted() {
                 assert_eq!(a.standard_error, None);
                 continue;
             }
-            // Fixed parameters of a method are the same.
+            // Parameters that a method keeps fixed are equal.
             let distance = (a.value - b.value).abs() / a.standard_error.unwrap();
             assert!(distance < 3.0 || a.value == b.value, "{method:?}: {distance}");
         }

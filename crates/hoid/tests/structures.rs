@@ -235,7 +235,7 @@ fn robust_loss_limits_the_effect_of_outliers() {
 
 #[test]
 fn simulation_focus_minimises_the_simulation_error() {
-    // An ARX model of an output-error system: the equation error is biased, the simulation error is
+    // For an ARX model of an output-error system, the fit by equation error is biased; the fit by simulation error is
     // not.
     let truth = Truth::of(Structure::OutputError);
     let record = truth.record(2000, 2.0, 11);

@@ -20,7 +20,7 @@ const REFERENCE_TOLERANCE: f64 = 1e-6;
 const TIGHT_TOLERANCE: f64 = 1e-16;
 /// Distance from the minimum with the default tolerance, in standard errors: `sqrt(1e-12 n)` = 3e-5 for 1000 samples.
 const MAX_DEFAULT_DISTANCE: f64 = 1e-4;
-/// Relative difference of the loss: the square of this distance divided by n.
+/// Relative difference in the loss: the square of this distance divided by n.
 const LOSS_TOLERANCE: f64 = 1e-10;
 /// Four digits of a standard error.
 const STANDARD_ERROR_TOLERANCE: f64 = 5e-5;

@@ -1,5 +1,5 @@
-//! The fit of an operator that changes once: exact results without noise, bias, spread and coverage over simulated
-//! runs, and the report if nothing changes.
+//! The fit of an operator that changes once: exact results without noise; bias, spread and coverage over simulated
+//! runs; and the report if nothing changes.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::collections::BTreeMap;

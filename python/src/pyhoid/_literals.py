@@ -30,7 +30,7 @@ Criterion = Literal["loss", "aic", "aicc", "bic", "fpe", "mdl", "yic"]
 #: Treatment of faults of records.
 Faults = Literal["bridge", "cut", "report", "keep"]
 
-#: Trend removed from input and output.
+#: Trend removed from the input and the output.
 Detrending = Literal["none", "mean", "linear"]
 
 #: Treatment of a column without values in some rows.

@@ -180,12 +180,12 @@ class BatchSettings(TypedDict, total=False):
     # remnant of order m (remnant). For operators.
     noise: Literal["ar", "arma", "remnant"] | None
 
-    # Change of the operator: none, or one sigmoid change of its gains (hoid identify then
+    # Change in the operator: none, or one sigmoid change in its gains (hoid identify then
     # rejects --figure, --validate, --horizon and --report). For operators.
     change: Literal["none", "sigmoid"] | None
 
-    # Form of operator; auto: average over the forms that the data allow; lead with --change
-    # sigmoid. For operator, change="sigmoid".
+    # Form of the operator; auto: average over the forms that the data allow (with --change
+    # sigmoid: lead). For operator, change="sigmoid".
     form: (
         Literal[
             "auto",
@@ -217,8 +217,8 @@ class BatchSettings(TypedDict, total=False):
     delay: float | tuple[float, float] | None
 
     # Behaviour of e between samples: held (zoh), linear (foh: e was logged from a faster or
-    # continuous signal; tau_e is half a sample longer), or (auto) zoh or foh if noise-free data
-    # show it, else smooth with the delay for a held e. For operator.
+    # continuous signal; tau_e is half a sample longer), or auto (zoh or foh if noise-free data
+    # show which applies, else smooth, with tau_e as for a held e). For operator.
     intersample: Literal["auto", "zoh", "foh"] | None
 
     # Relative run-to-run variation of a person's gain; added to the error bars if there are
@@ -276,7 +276,7 @@ class BatchSettings(TypedDict, total=False):
     # search. For polynomials.
     nk: int | tuple[int, int] | range | str | None
 
-    # Criterion that selects among searched candidates. For polynomials.
+    # Criterion that selects among the candidates. For polynomials.
     criterion: Literal["loss", "aic", "aicc", "bic", "fpe", "mdl", "yic"] | None
 
     # Purpose of the model: one-step prediction, or simulation from the input alone. For pem.
@@ -312,10 +312,10 @@ METHODS = """``"rls"``: recursive least squares;
         ``"adaptive"``: gains in a basis common to all people, with its own noise model; needs
         no start fit;
         ``"fused"``: least squares for B with the poles of rpem, for comparison;
-        ``"ekf"``: extended Kalman filter of state and parameters, for comparison;
-        ``"ukf"``: unscented Kalman filter of state and parameters, for comparison;
-        ``"dual-ekf"``: two alternating extended Kalman filters, of state and of parameters, for
-        comparison;
+        ``"ekf"``: extended Kalman filter that estimates state and parameters, for comparison;
+        ``"ukf"``: unscented Kalman filter that estimates state and parameters, for comparison;
+        ``"dual-ekf"``: two alternating extended Kalman filters, one for the state and one for
+        the parameters, for comparison;
         ``"linear-network"``: single linear layer that learns K_e and K_e_dot after a known
         neuromuscular part, for comparison."""
 
@@ -406,11 +406,11 @@ BATCH_SETTINGS = """noise : Literal['ar', 'arma', 'remnant']
             Noise model: autoregression (ar), autoregression and moving average of order nc
             (arma), or remnant of order m (remnant). For operators.
         change : Literal['none', 'sigmoid']
-            Change of the operator: none, or one sigmoid change of its gains (hoid identify then
+            Change in the operator: none, or one sigmoid change in its gains (hoid identify then
             rejects --figure, --validate, --horizon and --report). For operators.
         form : Literal['auto', 'gain', 'lead', 'lead2', 'lag', 'lead-lag', 'lead2-lag', 'quadratic-integral', 'lead-droop', 'derivative', 'derivative-lead', 'canals', 'canals-rate']
-            Form of operator; auto: average over the forms that the data allow; lead with
-            --change sigmoid. For operator, change="sigmoid".
+            Form of the operator; auto: average over the forms that the data allow (with
+            --change sigmoid: lead). For operator, change="sigmoid".
         neuromuscular : Literal['yes', 'no']
             Include neuromuscular dynamics (omega_nm, zeta_nm). For operator, change="sigmoid".
         prior : str | PathLike[str] | Mapping[str, tuple[float, float]] | OperatorFit
@@ -421,8 +421,9 @@ BATCH_SETTINGS = """noise : Literal['ar', 'arma', 'remnant']
             Delay tau_e (for polynomials instead of nk = tau_e/Ts + 1) or a range to search.
         intersample : Literal['auto', 'zoh', 'foh']
             Behaviour of e between samples: held (zoh), linear (foh: e was logged from a faster
-            or continuous signal; tau_e is half a sample longer), or (auto) zoh or foh if
-            noise-free data show it, else smooth with the delay for a held e. For operator.
+            or continuous signal; tau_e is half a sample longer), or auto (zoh or foh if
+            noise-free data show which applies, else smooth, with tau_e as for a held e). For
+            operator.
         run_to_run : float
             Relative run-to-run variation of a person's gain; added to the error bars if there
             are fewer than five records. For operator.
@@ -467,7 +468,7 @@ BATCH_SETTINGS = """noise : Literal['ar', 'arma', 'remnant']
             Delay of b0 in samples (29) or dead time in s (0.28s), or a range (20..40,
             0.1s..0.4s) to search. For polynomials.
         criterion : Literal['loss', 'aic', 'aicc', 'bic', 'fpe', 'mdl', 'yic']
-            Criterion that selects among searched candidates. For polynomials.
+            Criterion that selects among the candidates. For polynomials.
         focus : Literal['prediction', 'simulation']
             Purpose of the model: one-step prediction, or simulation from the input alone. For
             pem.

@@ -22,15 +22,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Coupling:
-    """The test whether the control of an axis responds to the error of another axis."""
+    """The test of whether the control of an axis responds to the error of another axis."""
 
     #: Channel of the error of the other axis.
     input: str
-    #: Probability of such a response by chance; None if it was not tested.
+    #: p-value of the test against no response; None if it was not tested.
     p_value: float | None
     #: Whether a response was found.
     responds: bool
-    #: Why it was not tested; empty if it was.
+    #: Reason why there was no test; empty if there was one.
     reason: str
 
 
@@ -60,15 +60,15 @@ def identify_axes(
 ) -> list[Axis]:
     """Identify the operator of each axis of a person who controls several, and test their coupling.
 
-    It is ``hoid identify --pair``, with the same digits.
+    This is ``hoid identify --pair``, with the same digits.
 
     Parameters
     ----------
     records : Record or sequence of Record
-        They hold the signals of all axes.
+        Records that contain the signals of all axes.
     pairs : sequence of (str, str) or (str, str, str)
-        For each axis the channels of error, control and, for the test of the coupling, its own
-        excitation: ``[("ex", "ux", "rx"), ("ey", "uy", "ry")]``.
+        For each axis the channels of the error, the control and, for the test of the coupling, its
+        own excitation: ``[("ex", "ux", "rx"), ("ey", "uy", "ry")]``.
     faults, decimate, **settings
         As in `identify`, for each axis.
 

@@ -63,8 +63,8 @@ class Comparison(JsonResult):
         return pd.DataFrame([_flat(row) for row in getattr(self, table)])
 
     def mixed_model(self, quantity: str, fixed: str = "C(condition)", data: pd.DataFrame | None = None) -> Any:
-        """Fit a linear mixed model to the estimates, with an intercept for each person (statsmodels, restricted
-        likelihood).
+        """Fit a linear mixed model to the estimates, with an intercept for each person
+        (statsmodels, REML).
 
         All estimates have the same weight, regardless of their standard errors. The model allows designs that
         `compare` does not support.
@@ -172,8 +172,8 @@ def compare(
         analysed; or the directory that `group` wrote, or a file with the output of ``hoid group --json``.
     factor : str, mapping, or sequence of str
         The variable in which conditions or people differ: ``"axis:roll=C1r,C2r;pitch=C1p,C2p"``, or
-        ``{"axis": {"roll": ["C1r", "C2r"], "pitch": ["C1p", "C2p"]}}``. Several factors include their
-        interactions. Without a factor each condition is a level.
+        ``{"axis": {"roll": ["C1r", "C2r"], "pitch": ["C1p", "C2p"]}}``. With several factors, their
+        interactions are also compared. Without a factor each condition is a level.
     variation : {"within", "between"}
         Whether each person is in all levels or in one; by default determined from the results.
     of : str or sequence of str
@@ -185,8 +185,9 @@ def compare(
     adjust : {"holm", "none"}
         Adjustment of the p-values for multiple tests.
     weights : {"penalised", "reml"}
-        Estimate of the variance between people in their weights: kept away from zero, or from the
-        restricted likelihood, whose intervals are too short for few people.
+        Estimate of the variance between people from which the weights are computed: kept away from
+        zero, or by restricted maximum likelihood (REML), with which the intervals are too short for
+        few people.
     directory : path, optional
         Directory in which the results of recordings are kept for the next comparison; without it they are
         removed.

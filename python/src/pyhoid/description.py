@@ -96,7 +96,7 @@ class DescribingFunction:
     ) -> dict[str, Any]:
         """Fit ``K (1 + T_L s) exp(-tau s)`` to the response at the lines.
 
-        Returns gain, lead (s), delay (s) and the misfit.
+        Returns the gain, the lead (s), the delay (s) and the misfit.
 
         Parameters
         ----------
@@ -117,7 +117,7 @@ class DescribingFunction:
     def margins(
         self, num: str | Sequence[float], den: Sequence[float] | None = None
     ) -> dict[str, Estimate | None]:
-        """Crossover frequency and phase margin with a controlled element.
+        """Return the crossover frequency and the phase margin with a controlled element.
 
         `num` is the element as text, such as ``"90/(s(s+6))"``; or `num` and `den` are its coefficients
         in descending powers of s.

@@ -58,7 +58,7 @@ def unit_of(name: str, units: tuple[str, str] = ("", ""), own: str | None = None
 
 
 def channel_units(records: Sequence[Record]) -> tuple[str, str]:
-    """Return the units of input and output, regardless of the column names; empty if none is given."""
+    """Return the units of input and output, regardless of the column names; empty if none are given."""
     if not records:
         return ("", "")
     record, units = records[0], records[0].units

@@ -1,4 +1,4 @@
-"""Design of an experiment: number and length of the runs, and forcing function."""
+"""Design of an experiment: the number and length of the runs, and the forcing function."""
 
 from __future__ import annotations
 
@@ -205,7 +205,7 @@ def design(
     against: str | PathLike[str] | None = None,
     seed: int = 0,
 ) -> ExperimentDesign:
-    """Design an experiment: number and length of the runs, and forcing function.
+    """Design an experiment: the number and length of the runs, and the forcing function.
 
     Parameters
     ----------
@@ -215,17 +215,18 @@ def design(
     controlled_element : str or (array_like, array_like)
         Text such as ``"90/(s(s+6))"``, or numerator and denominator; by default from the scenario or group.
     wanted : mapping, str, or sequence of str
-        Accepted standard errors: ``{"tau_e": 0.05, "phase_margin": 2}``, or ``"tau_e=5%"``; in deg for the
-        margin, otherwise relative. Without it, all parameters are requested.
+        Accepted standard errors: ``{"tau_e": 0.05, "phase_margin": 2}``, or ``"tau_e=5%"``; in deg
+        for the margin, in s for ``tau_f``, otherwise relative. Without it, all parameters are
+        requested.
     difference : mapping or str
         A difference between two conditions that the experiment should find: ``{"crossover": 0.5}`` in the
         unit of the quantity, or ``"crossover=10%"`` of its value.
     power, alpha : float
-        Probability of finding the difference, and significance level of the test.
+        Probability of finding the difference, and the significance level of the test.
     between_people : float, str or path
-        Relative standard deviation of the difference between people, or a file that contains it: a
-        comparison as JSON, the result of a group with several conditions, or a ``population.json``. By
-        default it comes from ``people`` if they provide it; otherwise it is 0.1.
+        Relative standard deviation, over people, of the difference, or a file that contains it: a
+        comparison as JSON, the result of a group with several conditions, or a ``population.json``.
+        By default it comes from ``people`` if they provide it; otherwise it is 0.1.
     run_to_run : float, str or path
         Relative standard deviation of one person from run to run, or a directory that `group` wrote, whose
         runs determine it. It is part of the errors for the person, which determine the number of runs. By

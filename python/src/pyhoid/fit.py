@@ -157,7 +157,7 @@ class Fit(Model, Result):
 
     @property
     def levels(self) -> list[Estimate | None]:
-        """The constant of u in each record that is not a response to e, in the unit of u.
+        """The constant part of u in each record, which is not a response to e, in the unit of u.
 
         It is estimated for recorded data; empty for simulated runs and with ``faults="keep"``. None if
         the model has no static gain.
@@ -225,13 +225,13 @@ class Fit(Model, Result):
 
     @property
     def roots(self) -> list[dict[str, Any]]:
-        """Return poles and zeros with standard errors, natural frequency (rad/s) and damping."""
+        """Poles and zeros with standard errors, natural frequency (rad/s) and damping."""
         return self._native.roots
 
     def margins(
         self, num: str | Sequence[float], den: Sequence[float] | None = None
     ) -> dict[str, Estimate | None]:
-        """Return crossover frequency and margins with a controlled element.
+        """Return the crossover frequency and the margins with a controlled element.
 
         `num` is the element as text, such as ``"90/(s(s+6))"``; or `num` and `den` are its coefficients
         in descending powers of s.
@@ -241,7 +241,7 @@ class Fit(Model, Result):
         return estimates(self._native.margins(_options.controlled_element(num, den)))
 
     def to_pandas(self) -> pd.DataFrame:
-        """Return parameters, operator and remnant as a table: value, standard_error, unit.
+        """Return the parameters, the operator and the remnant as a table: value, standard_error, unit.
 
         >>> fit.to_pandas()
         """
@@ -260,7 +260,7 @@ class Fit(Model, Result):
         )
 
     def to_xarray(self) -> xr.Dataset:
-        """Return parameters and covariance over the coordinate ``parameter``.
+        """Return the parameters and their covariance over the coordinate ``parameter``.
 
         >>> fit.to_xarray()
         """

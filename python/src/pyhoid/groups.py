@@ -160,8 +160,9 @@ def simulate_people(
 ) -> int:
     """Simulate people with realistic operators and remnants.
 
-    People are drawn from the family of operators, from published ranges. Writes a file with the columns
-    t, e, u, d, y for each run, the true parameters to ``truth.csv``, and a manifest for `group`.
+    People are drawn from the family of operators, with parameters in published ranges. Writes a
+    file with the columns t, e, u, d, y for each run, the true parameters to ``truth.csv``, and a
+    manifest for `group`.
 
     Parameters
     ----------

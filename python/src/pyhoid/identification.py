@@ -197,9 +197,9 @@ def from_json(text: str) -> OperatorFit | Fit | TimeVaryingFit | Comparison | Ex
 
     The results of ``hoid compare --json`` and ``hoid design --json`` are restored, too.
 
-    It is equal to the result that was written, and gives the same predictions, simulations and validations.
-    It does not contain the samples of its records. The JSON of a trace, a description or a group does not
-    contain the whole result, so it is refused.
+    The restored result is equal to the written one, and gives the same predictions, simulations and
+    validations. It does not contain the samples of its records. The JSON of a trace, a description
+    or a group does not contain the whole result, so it is refused.
 
     Parameters
     ----------

@@ -83,7 +83,7 @@ def stream(
         rate = info.nominal_srate()
         if rate > 0 and abs(rate * tracker.sample_time - 1) > 0.05:
             raise OptionError(
-                f"the stream has a rate of {rate} Hz, but the tracker"
+                f"the stream has a rate of {rate} Hz, but the tracker has"
                 f" {1 / tracker.sample_time} Hz; create the tracker with the sample time of the stream"
             )
         outlet = _outlet(pylsl, lsl_out, 1 / tracker.sample_time)

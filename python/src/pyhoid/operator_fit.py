@@ -240,7 +240,7 @@ class OperatorFit(Model, Result):
     def margins(
         self, num: str | Sequence[float], den: Sequence[float] | None = None
     ) -> dict[str, Estimate | None]:
-        """Return crossover frequency and phase margin with a controlled element.
+        """Return the crossover frequency and the phase margin with a controlled element.
 
         `num` is the element as text, such as ``"90/(s(s+6))"``; or `num` and `den` are its coefficients
         in descending powers of s.
@@ -255,8 +255,8 @@ class OperatorFit(Model, Result):
 
         Each has input, role, form, parameters (name, value, standard_error, interval, determined, ...)
         and response (gain and phase with errors over frequency). Responses to inputs other than the error
-        also have preview (s), p_value (that the best form is due to chance) and forms (those compared; form
-        None is no response). Their form is None if no response was found.
+        also have preview (s), p_value (of the best form against no response) and forms (those
+        compared; form None is no response). Their form is None if no response was found.
 
         >>> [(c["input"], c["role"], c["form"]) for c in fit.channels]
         [('e', 'feedback', 'gain'), ('r', 'feedforward', 'derivative')]
@@ -358,7 +358,7 @@ class OperatorFit(Model, Result):
         return pd.DataFrame(rows, index=pd.Index(list(self.parameters), name="parameter"))
 
     def summary(self) -> str:
-        """Return verdict, parameters, and the basis of the errors, in plain text.
+        """Return the verdict, the parameters and the basis of the errors in plain text.
 
         >>> print(person.summary())
         """

@@ -60,7 +60,7 @@ class OperatorParameter(NamedTuple):
         return "(the prior alone)" if self.prior_share > 0.5 else "(not determined)"
 
     def _shown(self) -> str:
-        """Format value and error; empty if neither the data nor a prior carry information."""
+        """Format value and error; empty if neither the data nor a prior carries information."""
         if not self.determined and self.prior_share <= 0.5:
             return ""
         if self.standard_error is not None and self.standard_error > abs(self.value):

@@ -1,8 +1,8 @@
 """Figures with matplotlib in the style of hoid's reports, on new or existing axes.
 
 The hue identifies the model or method (blue, vermillion, green, ... of Okabe and Ito); black is the
-true or the measured signal. Bands extend two standard errors to each side (`deviations`), error bars
-one. Every function returns the axes on which it has drawn.
+true or the measured signal. Bands extend two standard errors to each side (`deviations`), error
+bars extend one. Every function returns the axes on which it has drawn.
 """
 
 from __future__ import annotations
@@ -429,7 +429,7 @@ def _mark_changes(ax: Axes, traces: Iterable[Trace], *, words: bool) -> None:
 
 
 def _limits(ax: Axes, extent: Iterable[Any]) -> None:
-    """Return limits with room for nearly all of the curves.
+    """Set limits with room for nearly all of the curves.
 
     Single values near a vanishing gain do not set the scale.
     """

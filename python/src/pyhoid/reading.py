@@ -89,7 +89,7 @@ def read(
     fill : bool
         Bridge missing values by linear interpolation.
     sparse : mapping, optional
-        Columns logged at their own times, so that they are missing in some rows, by name:
+        Columns logged at their own times and therefore missing in some rows, by name:
         ``{"u": "hold"}`` holds the last value, ``"linear"`` interpolates, ``"drop"`` drops those rows.
     columns : sequence of str, optional
         Columns to keep in addition to input, output and time; ``[]`` for none. The other columns of a
@@ -111,7 +111,7 @@ def read(
     run_in : float
         Time dropped at the start, in s.
     detrend : {"none", "mean", "linear"}
-        Trend removed from input and output, as the last step.
+        Trend removed from the input and the output, as the last step.
 
     Returns
     -------
@@ -340,9 +340,9 @@ def info(
     dict
         ``format``; ``columns`` with unit, type, rows and range of values; ``samplings`` with frequency,
         gaps and jitter; ``trouble`` with the problems of the sampling, their positions, sizes and
-        remedies; ``notes``; ``look`` with the columns of error and control, the excitation and its longest
-        span of whole periods, the lateness of the control, and in ``read`` the keywords with which `read`
-        reads the file accordingly (None if they are not certain).
+        remedies; ``notes``; ``look`` with the columns of the error and the control, the excitation
+        and its longest span of whole periods, the lateness of the control, and in ``read`` the
+        keywords with which `read` reads the file accordingly (None if they are not certain).
 
     Raises
     ------

@@ -366,7 +366,7 @@ class Record:
         return record
 
     def with_signals(self, input: str, output: str) -> Record:
-        """The record with other channels as its input (the error) and its output (the control).
+        """Return the record with other channels as its input (the error) and its output (the control).
 
         >>> record.with_signals("f_t", "u")
         """

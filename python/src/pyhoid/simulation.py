@@ -112,7 +112,7 @@ def margins(
     noise_levels: Sequence[float] = (0.01, 0.1, 0.2, 0.3),
     noise_definition: str = "response",
 ) -> dict[str, Any]:
-    """Return crossover frequency, margins and remnant gains of a scenario.
+    """Return the crossover frequency, the margins and the remnant gains of a scenario.
 
     Parameters
     ----------

@@ -192,7 +192,7 @@ def plan(source: str | PathLike[str] | Plan, *, replications: int | None = None)
 
 
 def plans() -> dict[str, str]:
-    """Return names and titles of the plans included with hoid.
+    """Return the names and titles of the plans included with hoid.
 
     Examples
     --------

@@ -94,7 +94,7 @@ class TimeVaryingFit(Result):
 
     @property
     def levels(self) -> list[Estimate | None]:
-        """The constant of u in each record that is not a response to e, in the unit of u.
+        """The constant part of u in each record, which is not a response to e, in the unit of u.
 
         None if it was not estimated: for simulated runs and with ``faults="keep"``.
         """

@@ -153,8 +153,8 @@ class Trace:
 
     @property
     def response_names(self) -> list[str]:
-        """Names of gain and phase at the frequencies of `at`, and of crossover and margin, as far as they
-        were requested, without their errors."""
+        """Names of the gain and phase at the frequencies of `at`, and of the crossover and margin,
+        as far as they were requested, without their errors."""
         starts = ("gain_db@", "phase_deg@", "crossover_rad_s", "phase_margin_deg")
         return [n for n in self.columns if n.startswith(starts) and not n.endswith("_se")]
 

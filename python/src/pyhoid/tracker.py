@@ -22,7 +22,7 @@ __all__ = ["Tracker"]
 
 
 class Tracker(_pyhoid.Tracker):
-    """A recursive estimate that processes one sample at a time.
+    """A recursive estimator that processes one sample at a time.
 
     The default method, ``"adaptive"``, gives its first estimate after one second. Other methods without a
     given start collect `warm_up` seconds, fit them, and continue from there; until then `ready` is False. A
@@ -37,7 +37,7 @@ class Tracker(_pyhoid.Tracker):
     warm_up : float, default 20
         Time collected before the start fit, in s.
     at : sequence of float
-        Frequencies in rad/s at which `responses` gives gain and phase.
+        Frequencies in rad/s at which `responses` gives the gain and phase.
     controlled_element : str or (sequence of float, sequence of float), optional
         Controlled element, as in `track`; with it, `crossover` and `phase_margin` are available.
     decimate : "auto", "off" or int

@@ -137,13 +137,13 @@ def track(
     >>> trace = pyhoid.track(record, "rpem", nk=29, nd=1)
     >>> trace["T_L"]
 
-    A person, from an earlier fit of them, with the loop that they closed:
+    Tracking of a person with an earlier fit as the prior, and the measures of the closed loop:
 
     >>> fit = pyhoid.identify(earlier)
     >>> trace = pyhoid.track(record, at=(1, 2.5), controlled_element="90/(s(s+6))", prior=fit)
     >>> trace["phase_margin_deg"], trace["phase_margin_deg_se"]
 
-    A person who sees the target:
+    Tracking of a person who sees the target:
 
     >>> trace = pyhoid.track(record, "rpem", inputs=["e", "f_t"], nd=1, nk=(14, 1), at=[2])
     >>> trace["gain_db[f_t]@2"]

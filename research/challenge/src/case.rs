@@ -96,16 +96,16 @@ pub enum Imperfection {
     Silent,
     /// There is no activity for this number of seconds at the start.
     IdleStart(f64),
-    /// From this time on, s, u is recorded with the opposite sign.
+    /// From this time on (s), u is recorded with the opposite sign.
     Polarity(f64),
 }
 
-/// A change of the operator only: remnant, plant and forcing function are unchanged.
+/// A change in the operator only: the remnant, the plant and the forcing function are unchanged.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OperatorChange {
     /// Time at which the change starts, s.
     pub at_s: f64,
-    /// Duration of the change, s; the parameter changes exponentially.
+    /// Duration of the change (s); the parameter changes exponentially.
     pub takes_s: f64,
     /// Parameter that changes.
     pub parameter: Parameter,
@@ -127,9 +127,9 @@ pub enum DelayKnown {
 /// A theme of the challenge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Theme {
-    /// Remnants without a change of the operator.
+    /// Remnants without a change in the operator.
     Remnants,
-    /// Changes of different parameters and sizes.
+    /// Changes in different parameters and of different sizes.
     Changes,
     /// Times and courses of changes.
     Courses,
@@ -182,7 +182,7 @@ pub struct Case {
     pub ratio: f64,
     /// Imperfection of the stick or the recorder.
     pub imperfection: Imperfection,
-    /// Changes of the operator in the order of time.
+    /// Changes in the operator in chronological order.
     pub operator_changes: Vec<OperatorChange>,
     /// Information about the delay that the methods receive.
     pub delay: DelayKnown,
@@ -211,7 +211,7 @@ impl Case {
         }
     }
 
-    /// Start span for every method, s: the first third, at most 30 s.
+    /// Start span for every method (s): the first third, at most 30 s.
     pub fn start_span_s(&self) -> (f64, f64) {
         (0.0, (self.length_s / 3.0).min(30.0))
     }

@@ -9,7 +9,7 @@ use super::{
     operator::{Parameter, Plant},
 };
 
-/// Default start of a change, s; `CHANGE_DURATION_S` is its default duration.
+/// Default start of a change (s); `CHANGE_DURATION_S` is its default duration.
 const DEFAULT_CHANGE_S: f64 = 45.0;
 const CHANGE_DURATION_S: f64 = 0.5;
 

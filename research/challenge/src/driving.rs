@@ -58,7 +58,7 @@ impl RemnantStrength {
     }
 }
 
-/// Returns the target or disturbance of a run, with unit rms.
+/// Returns the target or the disturbance of a run, with unit rms.
 pub(super) fn forcing(case: &Case, run: CaseRun) -> Result<ForcingFunction, SimError> {
     let lines: Vec<Sinusoid> = match case.forcing {
         Forcing::McRuer => MCRUER_RAD_S

@@ -19,7 +19,7 @@ pub struct Task {
     pub nk: Option<usize>,
     /// Frequencies at which the response is requested, rad/s.
     pub lines_rad_s: Vec<f64>,
-    /// Times at which the response is requested, s, in ascending order.
+    /// Times at which the response is requested (s), in ascending order.
     pub asked_s: Vec<f64>,
     /// Seam between two joined recordings; `None` for a single recording.
     pub seam: Option<Seam>,
@@ -82,7 +82,7 @@ impl Task {
 pub struct ReportedResponse {
     /// Response H at each line; empty if there is no estimate.
     pub response: Vec<Complex64>,
-    /// Variances of the real and the imaginary part of the response and their covariance, at each line.
+    /// Variances of the real and imaginary parts of the response and their covariance, at each line.
     pub covariance: Option<Vec<[f64; 3]>>,
     /// Parameters as name, value and standard error; the names are those of
     /// [`Operator::named_parameters`](super::Operator::named_parameters).

@@ -26,7 +26,7 @@ const LINE_COUNT: usize = 7;
 const LINES_RAD_S: (f64, f64) = (0.5, 6.0);
 /// Time before the first change at which the response is requested, s.
 const TIME_BEFORE_CHANGE_S: f64 = 0.5;
-/// Interval between requests if there is no change, s; `LONG_CASE_TIMES_S` are the times for the long case.
+/// Interval between requests if there is no change (s); `LONG_CASE_TIMES_S` are the times for the long case.
 const STEADY_INTERVAL_S: f64 = 10.0;
 const LONG_CASE_TIMES_S: [f64; 4] = [60.0, 120.0, 200.0, 300.0];
 /// Largest error, to which larger errors are limited.
@@ -88,7 +88,7 @@ pub struct ChangeOutcome {
     pub at_s: f64,
     /// Logarithm of the likelihood ratio of the true models within 5 and 8 s.
     pub evidence: [f64; 2],
-    /// Time to the first alarm, s; `None` if there is no alarm within 8 s.
+    /// Time to the first alarm (s); `None` if there is no alarm within 8 s.
     pub after_s: Option<f64>,
 }
 

@@ -75,7 +75,7 @@ pub(super) struct Noise {
     ts_s: f64,
 }
 
-/// Length of the computed impulse responses, s; the slowest part is a drift with a time constant of 10 s.
+/// Length of the computed impulse responses (s); the slowest part is a drift with a time constant of 10 s.
 const MEMORY_S: f64 = 60.0;
 /// Order of the autoregressive model that whitens a remnant.
 const WHITENING_ORDER: usize = 30;

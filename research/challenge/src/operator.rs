@@ -41,7 +41,7 @@ pub struct Operator {
 pub enum Parameter {
     /// K_e, the gain at low frequencies, with K_e_dot unchanged.
     KE,
-    /// K_e_dot, by a change of the lead, with K_e unchanged.
+    /// K_e_dot, by a change in the lead, with K_e unchanged.
     KEDot,
     /// The gain K, and with it K_e and K_e_dot.
     Gain,
@@ -177,7 +177,7 @@ pub fn hold(omega_rad_s: f64, sample_time: SampleTime) -> Complex64 {
 pub(super) const MAX_STATES: usize = 6;
 
 /// A system without zeros, `x = v/(a_0 + a_1 s + ... + a_n s^n)`, whose states are x and its derivatives. Outputs are
-/// weighted sums of the states, so a change of the gain acts at once.
+/// weighted sums of the states, so a change in the gain acts at once.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Canonical {
     /// The state: x, its first derivative, and so on.

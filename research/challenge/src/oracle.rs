@@ -4,8 +4,8 @@
 //! model before it, if the time of the change and the spectrum, density and time course of the remnant are known:
 //! `sum over k of log f(A n/s) - log f(A (n + delta)/s)`. Here n is the remnant, delta the difference between the
 //! responses of the present operator and of the operator before the change to the same errors, and A the whitening
-//! filter. Above 12 a change is certain: a good test with one false alarm per hour finds it. The ratio is computed
-//! before stick and recorder, where the model is exact.
+//! filter. Above 12 a change is certain: a good test with one false alarm per hour finds it. The ratio is computed from
+//! the signals before the stick and the recorder, where the model is exact.
 //!
 //! **Batch fit with known changes.** A Box-Jenkins model with the true delay and a noise model of order 4 is fitted by
 //! the prediction-error method to all data since the last change. It uses every sample, and its errors are those that

@@ -1,7 +1,7 @@
 //! The same evaluation with recorded people.
 //!
 //! Trials of one person, each with 40 s after a ramp and sampled at 60 Hz, are joined. A trial on `1/s` joined to one
-//! on `1/(s(s+1))`, or vice versa, gives a change of the plant and hence of the operator at 40 s; two trials on the
+//! on `1/(s(s+1))`, or vice versa, gives a change in the plant and hence in the operator at 40 s; two trials on the
 //! same plant give a seam without a change. The second trial has its own ramp as history ([`Seam`]), so no filter
 //! jumps. Single trials contain no change. The true response is the average describing function of the person over
 //! their other trials on that plant, at the seven lowest lines of the disturbance: `sum U conj(D) / sum E conj(D)` over
@@ -24,7 +24,7 @@ use super::{
 };
 use crate::ChallengeError;
 
-/// Length of the ramp, s; `TRIAL_S` is the length of a trial after the ramp and `PERIOD_S` the period of the
+/// Length of the ramp (s); `TRIAL_S` is the length of a trial after the ramp and `PERIOD_S` the period of the
 /// disturbance.
 const RAMP_S: f64 = 5.0;
 const TRIAL_S: f64 = 40.0;
@@ -32,11 +32,11 @@ const PERIOD_S: f64 = 20.0;
 /// Frequencies of the lines as multiples of 1/period.
 const LINE_MULTIPLES: [f64; 7] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0];
 const RATE_HZ: f64 = 60.0;
-/// Start span of joined trials, s; `SINGLE_START_S` is the start span of single trials.
+/// Start span of joined trials (s); `SINGLE_START_S` is the start span of single trials.
 const START_S: (f64, f64) = (5.0, 30.0);
 const SINGLE_START_S: (f64, f64) = (5.0, 20.0);
 
-/// Evidence assigned to a change of the plant, which is known and therefore not computed.
+/// Evidence assigned to a change in the plant, which is known and therefore not computed.
 const KNOWN_CHANGE_EVIDENCE: f64 = 1e9;
 
 /// Options of the runs.

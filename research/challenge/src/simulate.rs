@@ -1,7 +1,7 @@
 //! Simulation of the loop of a case, step by step in continuous time.
 //!
-//! The loop is `e = f - y`, `u = stick(Y e + n)`, `y = P (u + d)`, with a run-in of 15 s. Operator and plant are
-//! integrated in steps of at most a millisecond ([`Canonical`]). The delay is read from the history of e, at any
+//! The loop is `e = f - y`, `u = stick(Y e + n)`, `y = P (u + d)`, with a run-in of 15 s. The operator and the plant
+//! are integrated in steps of at most a millisecond ([`Canonical`]). The delay is read from the history of e, at any
 //! fraction of a step: a held error enters each step with its mean over that step, a continuous error with its values
 //! interpolated between the steps. Only the random streams are shared with the simulators of [`hoid_sim`].
 //!
@@ -102,11 +102,11 @@ const ALIAS_COUNT: i32 = 100;
 /// True values at each sample.
 #[derive(Debug, Clone)]
 pub struct OracleData {
-    /// Remnant before stick and recorder, with the recorded sign.
+    /// Remnant before the stick and the recorder, with the recorded sign.
     pub(super) n: Vec<f64>,
     /// Time course s of the remnant's strength.
     pub(super) level: Vec<f64>,
-    /// Response of the operator to the error, before stick and recorder, with the recorded sign.
+    /// Response of the operator to the error, before the stick and the recorder, with the recorded sign.
     pub(super) response: Vec<f64>,
     /// First sample of each change, with the response from this sample on of the operator before the change.
     pub(super) before: Vec<(usize, Vec<f64>)>,

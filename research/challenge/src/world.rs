@@ -1,4 +1,4 @@
-//! Operator and plant between two samples, with the history of the error.
+//! The operator and the plant between two samples, with the history of the error.
 //!
 //! The steps are at most a millisecond long. The delay is read from the history at any fraction of a step: a held error
 //! enters each step with its mean over that step, a continuous error with its values interpolated between the steps.
@@ -28,7 +28,7 @@ impl OperatorPolynomials {
     }
 }
 
-/// States of operator and plant, and the history of the error.
+/// States of the operator and the plant, and the history of the error.
 pub(super) struct LoopState {
     pub operator: Canonical,
     pub plant: Canonical,

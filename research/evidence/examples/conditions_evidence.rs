@@ -21,7 +21,7 @@ use hoid_track::{Sample, TrackOptions, Tracker};
 /// A seed that was not used for tuning.
 const SEED: u64 = 46_000;
 const COLUMNS: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
-/// Spans of the coverage, s: before the change, within 5 s after it, and later.
+/// Spans of the coverage (s): before the change, within 5 s after it, and later.
 const SPANS: [(f64, f64); 3] = [(20.0, CHANGE_S), (CHANGE_S, CHANGE_S + 5.0), (CHANGE_S + 5.0, 82.0)];
 
 struct Cell {

@@ -1,9 +1,9 @@
 //! False alarm rate and power of the test of constancy.
 //!
 //! The clean runs are runs of C1 and C2 (Box-Jenkins and grey box) and of virtual people with every kind of remnant and
-//! controlled element (in their true form, one to three runs), `--runs N` of each (default 10). The same runs follow
-//! with a delay that jumps by 1, 5 and 20 samples at 6, 50 and 90 % of a run, and with another operator in the last
-//! third.
+//! controlled element (in their true form, one to three runs), `--runs N` of each (default 10). The same runs are then
+//! evaluated with a delay that jumps by 1, 5 and 20 samples at 6, 50 and 90 % of a run, and with another operator in
+//! the last third.
 #![allow(clippy::print_stdout, clippy::unwrap_used)]
 
 use std::{collections::BTreeMap, env};

@@ -5,13 +5,13 @@
 //! cargo xtask slow intersample-coverage [PEOPLE] [SEED]
 //! ```
 //!
-//! Each person has a gain of 1 to 3, a lead of 0.2 to 1 s, a neuromuscular system of 8 to 14 rad/s and damping 0.2 to
-//! 0.5, and a delay of 0.15 to 0.35 s. The error is a sum of twelve sinusoids from 0.3 to 12 rad/s over 60 s; the noise
-//! of u is an autoregression with a time constant of 0.1 s and a tenth of the power. Held errors pass through the exact
-//! model at their rate; continuous errors are simulated at 2000 Hz, and every k-th sample is recorded. Rates above 200
-//! Hz are decimated to 100 Hz, as by `hoid identify`. A share of 95 % of n people has a standard error of
-//! `sqrt(.95 .05/n)`. The interval of one run uses Student's quantile for its blocks, 2.36 standard errors; the third
-//! share is for intervals of 1.96 standard errors.
+//! Each person has a gain of 1 to 3, a lead of 0.2 to 1 s, a neuromuscular system with a natural frequency of 8 to 14
+//! rad/s and a damping ratio of 0.2 to 0.5, and a delay of 0.15 to 0.35 s. The error is a sum of twelve sinusoids from
+//! 0.3 to 12 rad/s over 60 s; the noise of u is an autoregression with a time constant of 0.1 s and a tenth of the
+//! power. Held errors pass through the exact model at their rate; continuous errors are simulated at 2000 Hz, and every
+//! k-th sample is recorded. Rates above 200 Hz are decimated to 100 Hz, as by `hoid identify`. A share of 95 % of n
+//! people has a standard error of `sqrt(.95 .05/n)`. The interval of one run uses Student's quantile for its blocks,
+//! 2.36 standard errors; the third share is for intervals of 1.96 standard errors.
 
 #![allow(clippy::print_stdout)]
 

@@ -1,16 +1,17 @@
-//! Random operators of all default forms, simulated with little noise or none: identification of form, parameters and
-//! intersample behaviour of the error.
+//! Random operators of all default forms, simulated with little noise or none: identification of the form, the
+//! parameters and the intersample behaviour of the error.
 //!
 //! ```sh
 //! cargo xtask slow little-noise [PEOPLE] [SEED]
 //! ```
 //!
 //! Each operator has a gain K from 0.1 to 10 (log-uniform), leads of 0.1 to 2 s, lags of 0.2 to 5 s, a neuromuscular
-//! system of 6 to 20 rad/s with damping 0.1 to 0.8, and a delay of 0.1 to 0.4 s; the records have 60 s and 20 to 200
-//! Hz. The error is a sum of twelve sinusoids of random phases from 0.2 to 15 rad/s and white noise; it is held between
-//! samples or, for every second person, linear. The noise of u is white, with a share of its power of 0, 1e-12, 1e-9,
-//! 1e-6 or 1e-3. The study counts correct forms and intersample behaviours, and people whose response from 0.5 to 10
-//! rad/s deviates by more than 1e-6 of the response and by more than five standard errors.
+//! system with a natural frequency of 6 to 20 rad/s and a damping ratio of 0.1 to 0.8, and a delay of 0.1 to 0.4 s; the
+//! records last 60 s and are sampled at 20 to 200 Hz. The error is a sum of twelve sinusoids of random phases from 0.2
+//! to 15 rad/s and white noise; between samples it is held or, for every second person, varies linearly. The noise of u
+//! is white, with a share of its power of 0, 1e-12, 1e-9, 1e-6 or 1e-3. The study counts correct forms and intersample
+//! behaviours, and people whose response from 0.5 to 10 rad/s deviates by more than 1e-6 of the response and by more
+//! than five standard errors.
 
 #![allow(clippy::print_stdout)]
 

@@ -289,7 +289,7 @@ fn print_tuning_errors(runs: usize) {
     }
 }
 
-/// Prints the results for the cells for tuning `multiple-model`: C3 and C5, C1 and C2, and changes of the neuromuscular
+/// Prints the results for the cells for tuning `multiple-model`: C3 and C5, C1 and C2, and changes in the neuromuscular
 /// system other than those of the plan. The errors are geometric means over the cells of the median run.
 fn print_tuning_cells(runs: usize) {
     let options = options(hoid_survey::multiple_model());
@@ -392,7 +392,7 @@ fn print_tuning_cells(runs: usize) {
     }
 }
 
-/// Reads error and control for t in [5, 45) s.
+/// Reads the error and the control for t in [5, 45) s.
 fn read_recording(path: &str) -> [Vec<f64>; 2] {
     let text = std::fs::read_to_string(path).unwrap();
     let mut lines = text.lines();

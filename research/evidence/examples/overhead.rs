@@ -27,7 +27,7 @@ fn main() {
     for (structure, runs) in [(Structure::Arx, 400), (Structure::BoxJenkins, 200)] {
         let estimator = Estimator::new(structure, structure.operator_orders(29));
         let fit = median(runs, || {
-            // As in Python, which passes arrays.
+            // The record is created from arrays, as in Python.
             let channel = |name: &str, values: &[f64]| Channel::new(name, "deg", values.to_vec());
             let input = channel("e", record.input());
             let record = Record::new(record.sample_time(), input, channel("u", record.output())).unwrap();

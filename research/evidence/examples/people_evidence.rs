@@ -31,7 +31,7 @@ const SETTLING_S: f64 = 12.0;
 const MAX_DETECTION_TIME_S: f64 = 8.0;
 const CERTAIN_LOG_RATIO: f64 = 12.0;
 
-/// Error, output and disturbance of a trial, and error and output of the ramp before it.
+/// The error, the output and the disturbance of a trial, and the error and the output of the ramp before it.
 struct Trial {
     signals: [Vec<f64>; 3],
     ramp: [Vec<f64>; 2],

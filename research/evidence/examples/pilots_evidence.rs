@@ -8,7 +8,8 @@
 //! its six runs. The error of H is `sqrt(mean((ln |H|/|H_ref|)^2 + (arg H/H_ref)^2))` over the frequencies. No method
 //! gets prior information. Conditions C6 to C8 change at 50 s, and C3 to C5 change slowly about 50 s; C1 and C2, and
 //! the axis that does not change, are constant. Alarms are counted from 20 s on if nothing changes, and otherwise
-//! before the change. The bands are the shares of the 95 % intervals of gain and of phase that contain the reference.
+//! before the change. The bands are the shares of the 95 % intervals of the gain and of the phase that contain the
+//! reference.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::{collections::BTreeMap, env, f64::consts::PI, fs, path::Path};
@@ -98,7 +99,7 @@ struct Run {
     errors: [f64; 3],
     /// Share of the time in which the estimate is nearer to the operator with H2, before 50 s and from 65 s on.
     nearer: [f64; 2],
-    /// Number of bands of gain and of phase that contain the reference.
+    /// Number of bands of the gain and of the phase that contain the reference.
     hold: [[f64; 2]; 6],
     alarms_s: Vec<f64>,
     changed_at_s: Vec<f64>,

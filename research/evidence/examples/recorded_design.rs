@@ -1,4 +1,4 @@
-//! Errors that a design predicts for recorded people from one run, against the scatter of their other runs.
+//! Compares the errors that a design predicts for recorded people from one run with the scatter of their other runs.
 //!
 //! ```sh
 //! HOID_HUMAN_DATA=DIR HOID_PILOT_DATA=DIR cargo run --release -p hoid-evidence --example recorded_design
@@ -10,8 +10,8 @@
 //! predicts the errors of a run of this length. The scatter is the standard deviation of the estimates of the other
 //! runs, divided by `c_4 = 1 - 1/(4 (n - 1))`. It contains the person's variation from run to run, so it is also
 //! compared with the error for the person, which includes the default variation [`RUN_TO_RUN_DEVIATION`]. This default
-//! is the median over the people with a disturbance of the variation of the crossover, `sqrt(scatter^2 - error^2)`; the
-//! pilots are an independent test. Quantities with an error above half of their value are excluded.
+//! is the median, over the people with a disturbance, of the variation in the crossover, `sqrt(scatter^2 - error^2)`;
+//! the pilots are an independent test. Quantities with an error above half of their value are excluded.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::{env, fs, path::Path};
@@ -29,7 +29,7 @@ use hoid_model::{
 
 const QUANTITIES: [&str; 4] = ["crossover", "phase_margin", "K", "tau_e"];
 
-/// A run with the lines of what excites it.
+/// A run with the lines of its excitation.
 struct Run {
     record: Record,
     lines: Vec<Sinusoid>,
@@ -47,7 +47,7 @@ struct Cell {
 }
 
 impl Run {
-    /// Of records over whole periods of these frequencies.
+    /// Creates a run from a record over whole periods of these frequencies.
     fn new(record: Record, exciting: &[f64], omegas: &[f64]) -> Self {
         let ts = record.sample_time().s();
         let coefficient = |values: &[f64], omega: f64| -> Complex64 {
@@ -97,8 +97,8 @@ impl Cell {
         }
     }
 
-    /// Prints the medians for each quantity, and returns the ratios of scatter to both predictions and the variation
-    /// from run to run: for each quantity, a value for each run.
+    /// Prints the medians for each quantity, and returns the ratios of the scatter to both predictions and the
+    /// variation from run to run, for each quantity and each run.
     fn ratios(&self) -> Vec<Vec<[f64; 3]>> {
         let fitted: Vec<Option<FamilyOperator>> = self.runs.iter().map(|run| run.operator(self.form)).collect();
         let values: Vec<Option<[f64; 4]>> = fitted
@@ -178,7 +178,7 @@ fn deviation(values: Vec<f64>) -> f64 {
     square.sqrt() / (1.0 - 0.25 / (n - 1.0))
 }
 
-/// People with a disturbance: two periods of 20 s at 60 Hz, u one row later.
+/// Returns the cells of the people with a disturbance: two periods of 20 s at 60 Hz, with u taken one row later.
 fn people_cells(folder: &Path) -> Vec<Cell> {
     const PRIMES: [f64; 11] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0, 31.0];
     let mut cells = Vec::new();
@@ -220,7 +220,8 @@ fn people_cells(folder: &Path) -> Vec<Cell> {
     cells
 }
 
-/// Pilots without a change: one period of 81.92 s of a target; the elements as they ran.
+/// Returns the cells of the pilots without a change: one period of 81.92 s of a target, with the elements as
+/// implemented.
 fn pilot_cells(folder: &Path) -> Vec<Cell> {
     const LINES: [f64; 10] = [3.0, 5.0, 8.0, 13.0, 22.0, 34.0, 53.0, 86.0, 139.0, 229.0];
     let omegas = LINES.map(|m| m * std::f64::consts::TAU / 81.92);

@@ -3,11 +3,11 @@
 //! `cargo run --release -p hoid-evidence --example verdict_evidence -- [--runs N] [--seed S] [--method M] [--element]
 //! [--kinds]`
 //!
-//! The runs have 82 s at 100 Hz: operators with a lead on `1/s^2` and `1/(s(s+1))`, gain-like operators on `1/s`, and
-//! lags on a gain, with remnants of 5 to 30 % of the variance of u (a lag, a remnant that depends on u, or pulses). The
-//! virtual people of [`hoid_sim::people`] are added without faults. The loop of the modified runs is integrated here,
-//! in steps of 1 ms, and shares no code with [`hoid_sim`]. The limits were set on seeds below 1000; the default seed
-//! is 9000.
+//! The runs last 82 s and are sampled at 100 Hz: operators with a lead on `1/s^2` and `1/(s(s+1))`, gain-like operators
+//! on `1/s`, and lags on a gain, with remnants of 5 to 30 % of the variance of u (a lag, a remnant that depends on u,
+//! or pulses). The virtual people of [`hoid_sim::people`] are added without faults. The loop of the modified runs is
+//! integrated here, in steps of 1 ms, and shares no code with [`hoid_sim`]. The limits were set on seeds below 1000;
+//! the default seed is 9000.
 //!
 //! `HOID_HUMAN_DATA=DIR` evaluates the recordings of people in a folder instead: CSV with columns t, u and e, or r and
 //! y instead of e; u of a row was read one sample earlier.
@@ -468,7 +468,7 @@ fn main() {
     if let Some(folder) = &folder {
         let all_of = recordings(folder);
         let of_people = all_of.par_iter().map(|(name, record)| {
-            // Recordings are grouped by the second and third part of their names, without numbers.
+            // Recordings are grouped by the second and third parts of their names, without numbers.
             let group: Vec<&str> = name
                 .split('_')
                 .skip(1)

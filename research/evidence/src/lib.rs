@@ -5,7 +5,7 @@
 //! |---|---|
 //! | [`task`] | the conditions of the thesis, and execution of runs on all cores |
 //! | [`given_delay`] | methods with a given delay |
-//! | [`oracle`] | upper bound of the information about a change, if the operators before and after it are known |
+//! | [`oracle`] | upper bound on the information about a change, if the operators before and after it are known |
 //! | [`pilots`] | the folder of recorded pilots |
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)]

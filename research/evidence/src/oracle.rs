@@ -1,4 +1,4 @@
-//! Upper bound of the available information: the likelihood ratio of the operators after and before a change, if both
+//! Upper bound on the available information: the likelihood ratio of the operators after and before a change, if both
 //! are known.
 //!
 //! The gains s of each operator are estimated from all trials with that element (except the examined trial), in the
@@ -16,7 +16,7 @@ const ORDER: usize = 16;
 const DELAY_S: f64 = 0.2;
 const RESIDUAL_LIMIT: f64 = 3.5;
 
-/// Regressors and output of a trial, with the first row that is analysed.
+/// The regressors and the output of a trial, with the first row that is analysed.
 pub struct TrialRows {
     x: Vec<Vector3<f64>>,
     u: Vec<f64>,
@@ -41,7 +41,7 @@ impl TrialRows {
         }
     }
 
-    /// Returns regressors and output after the whitening filter `1 + d_1 q^-1 + ..`, with their means removed.
+    /// Returns the regressors and the output after the whitening filter `1 + d_1 q^-1 + ..`, with their means removed.
     fn whitened(&self, d: &[f64]) -> (Vec<Vector3<f64>>, Vec<f64>) {
         let rows = self.from..self.u.len();
         let x: Vec<Vector3<f64>> = rows

@@ -7,7 +7,7 @@ use std::{
 
 use hoid::{io::ReadOptions, model::Record};
 
-/// Start of the measurements, s; earlier data belong to the run-in.
+/// Start of the measurements (s); earlier data belong to the run-in.
 pub const MEASUREMENT_START_S: f64 = 8.08;
 
 /// Returns the folder given by `HOID_PILOT_DATA`; if the variable is not set, prints a message and returns `None`.

@@ -28,7 +28,7 @@ pub fn on_all_cores<T: Send>(runs: usize, one: impl Fn(u64) -> T + Sync) -> Vec<
     (0..runs).into_par_iter().map(|r| one(r as u64)).collect()
 }
 
-/// Median of the finite values.
+/// Median of the values that are not NaN.
 pub fn median(values: impl Iterator<Item = f64>) -> f64 {
     let mut values: Vec<f64> = values.filter(|v| !v.is_nan()).collect();
     values.sort_by(f64::total_cmp);

@@ -6,7 +6,7 @@
 //! | `operator` | operator of a person, whose form the evidence determines |
 //! | `remnant` | operator with a gain and a lead, and a remnant of order m |
 //! | `sigmoid` | operator whose gains change once |
-//! | `polynomials`, `polynomial_options` | polynomial structure with given or searched orders, fitted by the prediction error method or by instrumental variables |
+//! | `polynomials`, `polynomial_options` | polynomial structure with given or searched orders, fitted by the prediction-error method or by instrumental variables |
 
 mod operator;
 mod polynomial_options;

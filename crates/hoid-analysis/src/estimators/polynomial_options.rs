@@ -29,15 +29,15 @@ pub struct Polynomials {
     pub criterion: Criterion,
     /// Start of the search: values of all coefficients by name.
     pub start: Option<BTreeMap<String, f64>>,
-    /// Instrumental-variable method that replaces the prediction error method for the fit; the orders are still
-    /// selected by the prediction error method.
+    /// Instrumental-variable method that replaces the prediction-error method for the fit; the orders are still
+    /// selected by the prediction-error method.
     pub method: Option<IvMethod>,
     /// Components of the instruments; by default the forcing function, if it was recorded.
     pub instruments: Option<Instruments>,
 }
 
 impl Polynomials {
-    /// Returns the defaults: orders of the operator, fitted by the prediction error method.
+    /// Returns the defaults: orders of the operator, fitted by the prediction-error method.
     pub fn new(structure: Structure) -> Self {
         Self {
             template: Estimator::new(structure, Orders::default()),
@@ -60,7 +60,7 @@ impl Polynomials {
     }
 }
 
-/// Returns the names of the options that only the prediction error method has, and of the options that only
+/// Returns the names of the options that only the prediction-error method has, and of the options that only
 /// instrumental variables have.
 pub(super) fn method_option_names() -> [Vec<&'static str>; 2] {
     [prediction_error_options(), instrument_options()]
@@ -83,7 +83,7 @@ impl BatchOptions for Polynomials {
 fn order_options() -> Vec<BatchOption<Polynomials>> {
     let default = "bj nb=2,nd=1..4,nf=2; arx na=2,nb=2";
     let nk = "Delay of b0 in samples (29) or dead time in s (0.28s), or a range (20..40, 0.1s..0.4s) to search";
-    let criterion = "Criterion that selects among searched candidates";
+    let criterion = "Criterion that selects among the candidates";
     vec![
         BatchOption::new(
             shared::orders_setting(default),
@@ -133,7 +133,7 @@ fn order_options() -> Vec<BatchOption<Polynomials>> {
     ]
 }
 
-/// Returns the options that only the prediction error method has.
+/// Returns the options that only the prediction-error method has.
 fn prediction_error_options() -> Vec<BatchOption<Polynomials>> {
     let focus = "Purpose of the model: one-step prediction, or simulation from the input alone";
     let start = "Start of the search: all coefficients, such as f1=-1.9,f2=.92,b0=.04,...";

@@ -1,4 +1,4 @@
-//! Polynomial structures, fitted by the prediction error method or by instrumental variables; orders and delay are
+//! Polynomial structures, fitted by the prediction-error method or by instrumental variables; orders and delay are
 //! given or searched.
 
 use hoid_ident::{
@@ -206,7 +206,7 @@ impl BatchEstimator for Polynomials {
             let others = verdict.findings().iter().filter(|finding| finding.kind != "stretch");
             verdict = Verdict::of(others.cloned().collect());
         }
-        // The second fit uses the prediction error method with a squared loss; for other methods and losses it is not
+        // The second fit uses the prediction-error method with a squared loss; for other methods and losses it is not
         // made.
         let is_asked_again =
             how.method.is_none() && estimator.loss == Loss::Quadratic && !steps && fit.rounding_error_share().is_none();

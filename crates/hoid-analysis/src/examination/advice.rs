@@ -18,9 +18,9 @@ pub struct Advice {
     pub trial: Option<TrialChoice>,
     /// Sampling frequency, Hz.
     pub sampling_hz: Option<f64>,
-    /// Start of the span of whole periods or of the requested span, s; `None` for the start of the record.
+    /// Start of the span of whole periods or of the requested span (in s); `None` for the start of the record.
     pub from_s: Option<f64>,
-    /// End of the span of whole periods or of the requested span, s; `None` for the end of the record.
+    /// End of the span of whole periods or of the requested span (in s); `None` for the end of the record.
     pub to_s: Option<f64>,
     /// Number of samples by which the output was recorded late.
     pub late_samples: Option<f64>,

@@ -56,7 +56,7 @@ mod tests {
 
     use super::*;
 
-    /// A loop around `y = (u + d) / s` with noise in u, which is recorded a number of samples late.
+    /// Returns a loop around `y = (u + d) / s` with noise in u, which is recorded `late` samples late.
     fn integrator_loop(late: usize) -> Record {
         let (ts, n) = (0.02_f64, 2000_usize);
         let (mut y, mut noise, mut state) = (0.0, 0.0, 7_u64);

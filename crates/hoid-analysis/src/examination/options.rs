@@ -18,7 +18,7 @@ pub struct ExaminationOptions {
     pub time: Option<TimeChoice>,
     /// Trials of the file; determined from a time that restarts if `None`.
     pub trial: Option<TrialChoice>,
-    /// Sampling frequency, Hz; determined from the column t if `None`.
+    /// Sampling frequency (in Hz); determined from the column t if `None`.
     pub sampling_hz: Option<f64>,
     /// Start of the span to use, s.
     pub from_s: Option<f64>,

@@ -164,7 +164,7 @@ fn lines_in(record: &Record, channel: &str, (from_s, to_s): (f64, f64)) -> Optio
     let n = values.len() as f64;
     let power = variance(values);
     let of_line = |omega: &f64| -> f64 {
-        // The phasor turns by one step from sample to sample, which is much faster than a sine of each phase.
+        // Rotating a phasor by one step per sample is much faster than computing the sine of each phase.
         let turn = Complex64::from_polar(1.0, omega * span.sample_time().s());
         let mut phasor = Complex64::new(1.0, 0.0);
         let mut sum = Complex64::new(0.0, 0.0);
@@ -210,7 +210,7 @@ mod tests {
 
     use super::*;
 
-    /// Noise-like error and control, and a disturbance of period 10 s that starts at 3 s.
+    /// Returns a record of noise-like error and control, and a disturbance of period 10 s that starts at 3 s.
     fn record(lines: &[f64]) -> Record {
         let ts = SampleTime::new(0.02).unwrap();
         let n = 1300;
@@ -256,7 +256,7 @@ mod tests {
         assert_eq!(exact.span_s, (3.0, 23.0));
     }
 
-    /// The thesis's period of 8192 samples, in a record that starts and ends elsewhere.
+    /// The period of 8192 samples of the thesis is found in a record that starts and ends elsewhere.
     #[test]
     fn period_of_a_fraction_of_a_second_is_found() {
         let ts = SampleTime::AT_100_HZ;

@@ -142,7 +142,7 @@ pub fn operator(found: &Result<OperatorEstimate, NotConvertible>) -> Value {
     }
 }
 
-/// Returns crossover and margins of a known loop.
+/// Returns the crossover and margins of a known loop.
 pub fn margins(all: &Crossings) -> Map<String, Value> {
     let m = all.margins();
     let mut map = Map::new();
@@ -178,7 +178,7 @@ pub fn loop_shape(shape: &LoopShape) -> Map<String, Value> {
     map
 }
 
-/// Returns crossover and margins of an estimated loop.
+/// Returns the crossover and margins of an estimated loop.
 pub fn margin_estimates(m: &MarginEstimates) -> Value {
     let or_null = |e: &Option<Estimate>| e.as_ref().map_or(Value::Null, estimate);
     json!({

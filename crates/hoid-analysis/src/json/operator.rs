@@ -144,7 +144,7 @@ fn channels(found: &IdentifiedModel) -> Value {
     std::iter::once(feedback).chain(further).collect()
 }
 
-/// Returns gain and phase with their errors, in the format of the lines of a describing function.
+/// Returns the gains and phases with their errors, in the format of the lines of a describing function.
 pub(crate) fn response(points: &[ResponsePoint]) -> Value {
     let one = |p: &ResponsePoint| {
         json!({

@@ -186,7 +186,7 @@ impl<F: JsonFit> IdentifiedModel<F> {
     /// Returns the JSON object as indented text.
     ///
     /// # Errors
-    /// As [`Self::json`].
+    /// Same as [`Self::json`].
     pub fn to_json(&self) -> Result<String, AnalysisError> {
         Ok(format!("{:#}", Value::Object(self.json()?)))
     }

@@ -23,7 +23,8 @@ struct Table<T> {
 }
 
 /// Serialises a value to text; `None` if this is not possible.
-// By way of a table: half the code that is generated for each type of result, compared with serialising each to text.
+// Serialising to a table first halves the code that is generated for each type of result, compared with serialising
+// directly to text.
 pub fn serialise<T: Serialize>(value: &T) -> Option<String> {
     let text = toml::Table::try_from(Table { value }).ok()?.to_string();
     Some(format!("{}{text}", checksum(&text)))

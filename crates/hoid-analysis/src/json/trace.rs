@@ -16,7 +16,7 @@ impl TrackingResult {
     /// Returns the JSON object as text.
     ///
     /// # Errors
-    /// As [`TrackingResult::json`].
+    /// Same as [`TrackingResult::json`].
     pub fn to_json(&self) -> Result<String, AnalysisError> {
         Ok(format!("{:#}\n", Value::Object(self.json()?)))
     }
@@ -200,7 +200,7 @@ impl TrackingResult {
     }
 }
 
-/// Returns gain and phase at each of the frequencies in rad/s; null at a frequency without an estimate.
+/// Returns the gain and phase at each of the frequencies in rad/s; null at a frequency without an estimate.
 pub fn responses(at_rad_s: &[f64], of: impl Fn(usize, f64) -> Option<Response>) -> Value {
     let each = at_rad_s.iter().enumerate().map(|(place, omega)| {
         let response = of(place, *omega);
@@ -248,7 +248,7 @@ pub fn track_fault(fault: &TrackFault) -> Value {
     })
 }
 
-/// Returns a change of the person, with the time in s at which it was declared.
+/// Returns a change in the person, with the time in s at which it was declared.
 pub fn change(declared_at: Option<f64>, c: &Change) -> Value {
     let before_and_after = |pair: &[Estimate; 2]| json!({"before": estimate(&pair[0]), "after": estimate(&pair[1])});
     let numbers = |pair: &[f64; 2]| json!({"before": number(pair[0]), "after": number(pair[1])});

@@ -63,7 +63,7 @@ pub fn two_inputs(
         ("nf", nf),
         ("nk", nk),
     ];
-    // A method that starts itself has defaults of its own.
+    // A method that starts itself has its own defaults.
     let is_given = |name: &str| !starts_itself || is_typed(name) || name == "nk" && has_delays;
     let all = all.into_iter().filter(|(name, _)| is_given(name));
     let named = all.map(|(name, n)| (name.to_owned(), n..=n)).collect();

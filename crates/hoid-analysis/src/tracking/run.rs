@@ -39,7 +39,7 @@ const FIT_OPTIONS: [&str; 8] = [
 pub struct Tracking {
     /// The requested recursion.
     pub recursion: TrackRequest,
-    /// Span of the start fit, s; `None` for the first third of the record.
+    /// Span of the start fit (in s); `None` for the first third of the record.
     pub start_span_s: Option<(f64, f64)>,
     /// Time from which the estimate is updated, s.
     pub update_from_s: Option<f64>,

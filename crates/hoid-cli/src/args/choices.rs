@@ -1,14 +1,14 @@
-//! Choices of the library as the command line reads them: by their own names.
+//! Parsers for choices of the library by their names.
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use hoid::model::NamedChoice;
 
-/// One of some choices of the library, by its name.
+/// Returns a parser for the names of these choices.
 pub fn choice_parser<T: NamedChoice + Send + Sync>(choices: &'static [T]) -> impl TypedValueParser<Value = T> {
     value_parser_by_name(choices.iter().map(|choice| (choice.choice_name(), *choice)))
 }
 
-/// One of some values by its name, in capitals or not where the option takes both.
+/// Returns a parser for the names of these values; capitals are accepted if the option ignores the case.
 pub fn value_parser_by_name<T: Clone + Send + Sync + 'static>(
     values: impl IntoIterator<Item = (&'static str, T)>,
 ) -> impl TypedValueParser<Value = T> {

@@ -117,7 +117,7 @@ mod tests {
         crate::args::command().debug_assert();
     }
 
-    /// The help pages as a page of the book.
+    /// Returns the help pages as a page of the book.
     fn reference_page() -> String {
         let mut page = "# Command line\n\nThe help pages of the program, word for word.\n".to_owned();
         let mut cli = crate::args::command().term_width(110);

@@ -35,8 +35,8 @@ pub struct CompareArgs {
     /// Adjustment for multiple tests
     #[arg(long, value_name = "METHOD", default_value = "holm", value_parser = choice_parser(&Adjustment::ALL))]
     pub adjust: Adjustment,
-    /// Estimator of the variance between people: penalised (kept away from zero) or reml (restricted likelihood;
-    /// intervals too short with few people)
+    /// Estimator of the variance between people: penalised (kept away from zero) or reml (restricted maximum
+    /// likelihood; intervals too short with few people)
     #[arg(long, value_name = "METHOD", default_value = "penalised", value_parser = choice_parser(&Weights::ALL))]
     pub weights: Weights,
     /// Directory for all results: comparison.json, differences.csv, .md and .tex, people.svg, sentences.txt, and the

@@ -67,7 +67,7 @@ pub struct ConvertArgs {
     pub json: bool,
 }
 
-/// A discretisation; prewarping needs its frequency in addition.
+/// A discretisation; `Prewarped` also needs a frequency.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum MethodName {
     Zoh,
@@ -80,7 +80,7 @@ pub enum MethodName {
 }
 
 impl MethodName {
-    /// The method of the library.
+    /// Returns the corresponding method of the library.
     pub fn method(self, prewarp_rad_s: Option<f64>) -> discretise::Method {
         match self {
             Self::Zoh => discretise::Method::ZeroOrderHold,

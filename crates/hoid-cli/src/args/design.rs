@@ -14,7 +14,7 @@ use super::{choices::choice_parser, figure::FigureArgs, output_options::ShowArgs
 pub struct DesignArgs {
     /// People to design for: population (people in general, adapted to the controlled element), a family scenario
     /// (.toml), a fit (`hoid identify --json`), or a group (directory of `hoid group --out`, its JSON or
-    /// population.json). For several people, reports errors of the typical and worst person
+    /// population.json). For several people, reports the errors of the typical and the worst person
     #[arg(long, value_name = "population|FILE|DIR", default_value = "population")]
     pub people: People,
     /// Condition to use if the group has several
@@ -55,7 +55,7 @@ pub struct DesignArgs {
     /// Minimum distance between lines, in multiples of the fundamental 1/length
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
     pub spacing: u32,
-    /// Lowest and highest frequency of the lines, rad/s
+    /// Lowest and highest frequencies of the lines in rad/s
     #[arg(long, value_name = "LO..HI", default_value = "0.2..18", value_parser = parse_span)]
     pub band: (f64, f64),
     /// Largest amplitude of a line above the crossover, relative to the mean below it; larger amplitudes make people

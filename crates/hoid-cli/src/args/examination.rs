@@ -6,7 +6,7 @@ use hoid::model::ContinuousTransferFunction;
 
 use super::reading::ClockArgs;
 
-/// Options given by the user, which are therefore not searched for.
+/// Options that are otherwise detected.
 #[derive(Debug, Args)]
 pub struct ExaminationArgs {
     /// Input column (tracking error), or a difference such as r-y [default: by name]
@@ -33,7 +33,7 @@ pub struct ExaminationArgs {
 }
 
 impl ExaminationArgs {
-    /// The text as typed.
+    /// Returns these options for the library.
     pub fn to_options(&self) -> ExaminationOptions {
         ExaminationOptions {
             input: self.input.clone(),
@@ -50,7 +50,7 @@ impl ExaminationArgs {
     }
 }
 
-/// The element as it was typed, and as it is meant.
+/// Parses a controlled element; returns its text and the transfer function.
 fn parse_element(text: &str) -> Result<(String, ContinuousTransferFunction), String> {
     let element = text
         .parse::<ContinuousTransferFunction>()

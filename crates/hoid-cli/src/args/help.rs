@@ -8,11 +8,11 @@ use clap::{Arg, Command, CommandFactory};
 
 use super::Cli;
 
-/// Report of help on a command other than its options.
+/// Help for a command other than its options.
 struct Help {
     command: &'static str,
     examples: &'static [&'static str],
-    /// Options of `-h`; all where it names none.
+    /// Options that `-h` shows; all if the list is empty.
     shown: &'static [&'static str],
 }
 
@@ -280,7 +280,7 @@ const COMMAND_HELP: [Help; 19] = [
     },
 ];
 
-/// Headings of options that several commands share; other options are under the model.
+/// Headings of options that several commands share; other options are under the heading Model.
 const OPTION_HEADINGS: [(&str, &[&str]); 2] = [
     (
         "Data",
@@ -339,7 +339,7 @@ const OPTION_HEADINGS: [(&str, &[&str]); 2] = [
 /// The commands whose options are under headings.
 const COMMANDS_WITH_HEADINGS: [&str; 4] = ["identify", "describe", "track", "stream"];
 
-/// The program as it is parsed and as it explains itself.
+/// Returns the definition of the program, with its help.
 pub fn command() -> Command {
     let mut program = Cli::command().mut_subcommands(add_help);
     let page = first_page(&mut program);
@@ -357,13 +357,13 @@ fn add_help(command: Command) -> Command {
     command.mut_args(|arg| add_argument_help(arg, help))
 }
 
-/// Choices are taken in capitals too.
+/// Accepts choices in capitals as well.
 fn ignore_case(arg: Arg) -> Arg {
     let takes_value = arg.get_action().takes_values();
     arg.ignore_case(takes_value)
 }
 
-/// Rarely needed options are shown by `--help` alone.
+/// Adds the heading of an option, and hides rarely needed options from `-h`; `--help` shows them.
 fn add_argument_help(arg: Arg, help: &Help) -> Arg {
     let id = arg.get_id().as_str().to_owned();
     let hidden = !arg.is_positional() && !help.shown.is_empty() && !help.shown.contains(&id.as_str());
@@ -375,7 +375,7 @@ fn add_argument_help(arg: Arg, help: &Help) -> Arg {
     arg.help_heading(heading.map_or("Model", |(heading, _)| heading))
 }
 
-/// The list of commands by purpose.
+/// Returns the first help page, which lists the commands by purpose.
 fn first_page(program: &mut Command) -> String {
     let about = |name: &str| {
         let command = program.get_subcommands().find(|c| c.get_name() == name);
@@ -399,7 +399,7 @@ mod tests {
 
     use super::*;
 
-    /// The words of an example after the program's name, as a shell would hand them over.
+    /// Returns the arguments that a shell would pass to the program in an example.
     fn shell_words(example: &str) -> Vec<String> {
         let (_, typed) = example.split_once("hoid ").unwrap();
         let typed = typed.split([' ']).take_while(|word| !["<", ">", "|"].contains(word));
@@ -464,7 +464,7 @@ mod tests {
         }
     }
 
-    /// An option that the first pages use is found where a newcomer looks first.
+    /// `-h` shows every option that the README and the first page of the book use.
     #[test]
     fn short_help_has_the_options_of_the_first_pages() {
         let mut program = command();

@@ -78,7 +78,7 @@ pub struct IdentifyArgs {
     pub show: ShowArgs,
 }
 
-/// The structures; earlier names are read, and not shown.
+/// Returns a parser for the structures; earlier names are accepted but not shown.
 fn structure_parser() -> PossibleValuesParser {
     let polynomials = Structure::ALL.map(|structure| PossibleValue::new(structure.name()));
     let before = ["grey-box", "family", "time-varying"].map(|name| PossibleValue::new(name).hide(true));

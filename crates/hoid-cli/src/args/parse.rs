@@ -1,6 +1,6 @@
-//! Values as they are typed: numbers with a range, spans of numbers, widths of figures.
+//! Parsers of values typed by users: numbers with a range, spans of numbers, widths of figures.
 
-/// `LO..HI`, finite and in order.
+/// Parses `LO..HI`, two finite numbers in ascending order.
 pub fn parse_span(text: &str) -> Result<(f64, f64), String> {
     let number = |part: &str| part.trim().parse::<f64>().ok().filter(|v| v.is_finite());
     let ends = text
@@ -14,7 +14,7 @@ pub fn parse_span(text: &str) -> Result<(f64, f64), String> {
     }
 }
 
-/// A width on paper, `85mm`, `8.5cm` or `3.3in`, in mm.
+/// Parses a width on paper, such as `85mm`, `8.5cm` or `3.3in`, and returns it in mm.
 pub fn parse_width(text: &str) -> Result<f64, String> {
     let units = [("mm", 1.0), ("cm", 10.0), ("in", 25.4)];
     let of = |(unit, mm): (&str, f64)| Some(text.trim().strip_suffix(unit)?.trim().parse::<f64>().ok()? * mm);

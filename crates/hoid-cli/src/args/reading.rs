@@ -70,7 +70,7 @@ pub struct ReadArgs {
 }
 
 impl ReadArgs {
-    /// The same with the first input alone: further ones are channels of the record, and are kept.
+    /// Returns these options with the first input alone; further inputs are kept as channels of the record.
     pub fn with_one_input(&self) -> Self {
         let further = self.inputs[1..].iter().cloned();
         Self {
@@ -83,7 +83,7 @@ impl ReadArgs {
         }
     }
 
-    /// The columns to keep in addition to input, output and time; `None` for all.
+    /// Returns the columns to keep in addition to the input, output and time; `None` for all.
     pub fn kept_columns(&self) -> Option<Vec<String>> {
         let kept = self.columns.as_ref()?;
         Some(kept.iter().filter(|column| *column != "none").cloned().collect())
@@ -160,7 +160,7 @@ pub struct FaultArgs {
     pub faults: FaultHandling,
 }
 
-/// `NAME=VALUE`; neither a name nor a column may contain `=`.
+/// Splits `NAME=VALUE` at the last `=`, so the name may contain `=`, but the value may not.
 fn parse_pair(text: &str) -> Result<(String, &str), String> {
     let (name, value) = text
         .rsplit_once('=')
@@ -169,12 +169,12 @@ fn parse_pair(text: &str) -> Result<(String, &str), String> {
     Ok((name.trim().to_owned(), value))
 }
 
-/// The column of the time.
+/// Parses the choice of the time column.
 fn parse_time(text: &str) -> Result<TimeChoice, String> {
     text.parse::<TimeChoice>().map_err(|error| error.to_string())
 }
 
-/// The trials of a file.
+/// Parses the choice of trials of a file.
 fn parse_trial(text: &str) -> Result<TrialChoice, String> {
     text.parse::<TrialChoice>().map_err(|error| error.to_string())
 }

@@ -28,7 +28,7 @@ use super::{
     udp::UdpAddresses,
 };
 
-/// The tracked signal, and how.
+/// Options of a recursion.
 #[derive(Debug, Args)]
 pub struct RecursionArgs {
     /// Recursive method
@@ -49,7 +49,7 @@ pub struct RecursionArgs {
     /// Delay tau_e in s, instead of --nk: .28, or a range (0.1..0.4) to search on the start span
     #[arg(long, value_name = "S|LO..HI", conflicts_with = "nk")]
     pub delay: Option<NumberOrSpan>,
-    /// Criterion that selects among searched candidates
+    /// Criterion that selects among the candidates
     #[arg(long, value_name = "NAME", default_value = "bic", value_parser = choice_parser(&Criterion::ALL))]
     pub criterion: Criterion,
     /// Initial values of all coefficients, such as f1=-1.9,f2=.92,b0=.04,..., or `nothing` [default: a batch fit of the
@@ -86,11 +86,11 @@ pub struct TrackArgs {
     /// adaptive also its preview in s (r=feedforward:0.5). The methods rls and rpem require --nk for two inputs
     #[arg(long, value_name = "COLUMN=ROLE")]
     pub role: Option<String>,
-    /// Span of the start fit, s, for methods that have one [default: the first third of the record]
+    /// Span of the start fit in s, for methods that have one [default: the first third of the record]
     #[arg(long, value_name = "S..S", value_parser = parse_span, allow_hyphen_values = true)]
     pub start_span: Option<(f64, f64)>,
-    /// Time from which the estimate is updated, s; before it, only the filters run [default: the end of the start span;
-    /// the first sample with --covariance or --start]
+    /// Time in s from which the estimate is updated; before it, only the filters run [default: the end of the start
+    /// span; the first sample with --covariance or --start]
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     pub update_from: Option<f64>,
     /// Second run of the same person in the same task: selects the initial covariance (--covariance) whose estimates
@@ -152,10 +152,10 @@ pub struct StreamArgs {
     /// ports, such as 0.0.0.0:5005:192.168.1.7:5006
     #[arg(long, value_name = "IN:OUT")]
     pub udp: Option<UdpAddresses>,
-    /// Stream of LabStreamingLayer: in Python, by pyhoid.lsl
+    /// LabStreamingLayer stream; available only in Python (pyhoid.lsl)
     #[arg(long, value_name = "NAME", hide = true)]
     pub lsl_in: Option<String>,
-    /// Stream of LabStreamingLayer: in Python, by pyhoid.lsl
+    /// LabStreamingLayer stream; available only in Python (pyhoid.lsl)
     #[arg(long, value_name = "NAME", hide = true)]
     pub lsl_out: Option<String>,
     /// Scale e or u by a factor (u=12.5) or from unit to unit (e=rad:deg). May be repeated
@@ -163,7 +163,7 @@ pub struct StreamArgs {
     pub scale: Vec<(String, Scaling)>,
 }
 
-/// The recursion, and which there are to be compared with.
+/// Returns the help of `--method`, which names the methods for comparison.
 fn method_help() -> String {
     let all = hoid::survey::methods();
     let others: Vec<&str> = all
@@ -178,7 +178,7 @@ fn method_help() -> String {
     )
 }
 
-/// The recursive methods, each with its line of help.
+/// Returns a parser for the names of the recursive methods, each with its line of help.
 pub(super) fn method_names() -> impl TypedValueParser<Value = String> {
     let value = |method: Method| {
         let MethodSpec { name, help, .. } = method.spec();

@@ -23,10 +23,10 @@ pub struct BatchEstimators;
 
 /// Commands and methods that have options.
 pub trait Registry {
-    /// The available items, in the order of help.
+    /// Returns the available items in the order of the help.
     fn specs() -> Vec<MethodSpec>;
 
-    /// Options that help does not show.
+    /// Returns the options that the help does not show.
     fn hidden_options() -> BTreeSet<&'static str> {
         BTreeSet::new()
     }
@@ -48,7 +48,7 @@ impl Registry for BatchEstimators {
     }
 }
 
-/// The text as typed: name and text, in the order of the registry.
+/// Options as typed: names and texts, in the order of the registry.
 #[derive(Debug, Clone, Default)]
 pub struct SettingArgs<R = RecursiveMethods> {
     given: Vec<(&'static str, String)>,
@@ -56,12 +56,12 @@ pub struct SettingArgs<R = RecursiveMethods> {
 }
 
 impl<R> SettingArgs<R> {
-    /// Name and text of each.
+    /// Returns the name and the text of each option given.
     pub fn given_settings(&self) -> impl Iterator<Item = (&'static str, &str)> {
         self.given.iter().map(|(name, text)| (*name, text.as_str()))
     }
 
-    /// The text of one.
+    /// Returns the text of an option, if it was given.
     pub fn text(&self, name: &str) -> Option<&str> {
         self.given_settings()
             .find(|(given, _)| *given == name)
@@ -69,7 +69,7 @@ impl<R> SettingArgs<R> {
     }
 }
 
-/// The flag of an option: its name, except for one that no language lets its keywords have.
+/// Returns the flag of an option: its name, except `for` for `answers` (a keyword argument cannot be called `for`).
 pub fn flag(name: &str) -> String {
     match name {
         "answers" => "for".to_owned(),
@@ -77,7 +77,7 @@ pub fn flag(name: &str) -> String {
     }
 }
 
-/// Estimators and methods as help names them, groups by one word.
+/// Returns the names of estimators and methods as in the help, with one word for a group.
 pub fn as_text(names: &[&str]) -> String {
     let operators = [OPERATOR, REMNANT, CHANGE];
     let polynomials: Vec<&str> = [PEM].into_iter().chain(IvMethod::ALL.map(IvMethod::name)).collect();
@@ -97,13 +97,13 @@ pub fn as_text(names: &[&str]) -> String {
     words.join(", ")
 }
 
-/// The methods that have an option.
+/// Returns the methods that have an option.
 pub fn methods_with<'s>(name: &str, methods: &'s [MethodSpec]) -> Vec<&'s str> {
     let has = |spec: &&MethodSpec| spec.settings.iter().any(|setting| setting.name == name);
     methods.iter().filter(has).map(|spec| spec.name).collect()
 }
 
-/// A command with a flag for each option of these methods.
+/// Returns the command with a flag for each option of these methods.
 pub fn with_settings(mut command: Command, methods: &[MethodSpec]) -> Command {
     let mut done = BTreeSet::new();
     for setting in methods.iter().flat_map(|spec| &spec.settings) {
@@ -143,8 +143,8 @@ fn argument(setting: &Setting, methods: &[MethodSpec]) -> Arg {
     }
 }
 
-/// Help, the methods that it is for where they are not all, and the default, which methods may have
-/// for themselves.
+/// Returns the help of an option, with the methods that have it unless all do, and with the default, which may differ
+/// between methods.
 fn help(setting: &Setting, methods: &[MethodSpec]) -> String {
     let mut text = setting.help.clone();
     if !setting.unit.is_empty() {

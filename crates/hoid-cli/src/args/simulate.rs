@@ -101,7 +101,7 @@ pub struct MarginsArgs {
     pub json: bool,
 }
 
-/// Which state of a scenario.
+/// State of a scenario.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum StateName {
     Initial,

@@ -5,7 +5,7 @@ use std::{
     str::FromStr,
 };
 
-/// Where samples come in, and where answers go.
+/// Addresses of the incoming samples and of the answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct UdpAddresses {
     pub input: SocketAddr,
@@ -46,7 +46,8 @@ impl FromStr for UdpAddresses {
                 "{text:?}: nothing can listen on port 0; give another output port"
             ));
         }
-        // Code that listens on 0.0.0.0 listens on every address of this computer, and 0.0.0.0 leads there too.
+        // A socket on 0.0.0.0 listens on every address of this computer, and a datagram sent to 0.0.0.0 also arrives at
+        // this computer.
         let is_here = |ip: IpAddr| ip.is_loopback() || ip.is_unspecified();
         let heard = input.ip() == output.ip()
             || (input.ip().is_unspecified() || output.ip().is_unspecified())

@@ -126,8 +126,8 @@ fn page(found: &Comparison, verbose: bool) -> String {
         difference_table(found, verbose)
     );
     page.push_str(
-        "Mean over people ± standard error, weighted by the error of each person and the variance between people; \
-         Hartung-Knapp 95 % intervals.\n",
+        "Mean over people ± standard error; weights from the standard error of each person and the variance between \
+         people; Hartung-Knapp 95 % intervals.\n",
     );
     if !found.learning.is_empty() {
         page.push_str(&format!("\nChange per run\n{}\n", learning_table(found)));

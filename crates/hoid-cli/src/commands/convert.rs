@@ -87,7 +87,7 @@ pub fn run(args: &ConvertArgs) -> Result<(), CliError> {
                 text.push_str("zeta_nm is not positive: the operator is not stable.\n");
             }
         }
-        Err(reason) => text.push_str(&format!("The model does not convert to an operator: {reason}.\n")),
+        Err(reason) => text.push_str(&format!("The model cannot be converted to an operator: {reason}.\n")),
     }
     output::show(&text)?;
     Ok(())

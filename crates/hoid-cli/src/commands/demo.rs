@@ -97,7 +97,7 @@ fn trace_error_table(record: &Record, traces: &[(String, Trace)]) -> String {
         "K_e_dot",
         "omega_nm",
         "zeta_nm",
-        "rows that convert",
+        "rows with an operator",
     ]);
     for (name, trace) in traces {
         let operators: Vec<_> = (0..trace.len()).map(|row| trace.operator(row)).collect();
@@ -257,8 +257,8 @@ fn write_stage_report(args: &DemoArgs, stages: &[Stage]) -> Result<PathBuf, CliE
         fit_summary: None,
         pictures: Vec::new(),
         notes: vec![
-            "Before: 0 to 30.72 s. After: 51.20 to 81.92 s. Delay and order of the noise model are searched for \
-             Box-Jenkins; ARX uses the same delay."
+            "Before: 0 to 30.72 s. After: 51.20 to 81.92 s. The delay and the order of the noise model are searched \
+             for Box-Jenkins; ARX uses the same delay."
                 .to_owned(),
         ],
     };

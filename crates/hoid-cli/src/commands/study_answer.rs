@@ -120,7 +120,7 @@ fn summary_text(summary: &OutputTable) -> String {
         Some(more) => format!("and {}\n", count_with_noun(more, "more row")),
     };
     format!(
-        "{table}\n{more}Fits: number that give an operator, of all fits. Relative bias in %: median over these fits \
+        "{table}\n{more}Fits: how many give an operator, out of all fits. Relative bias in %: median over these fits \
          and its Monte Carlo error. The table summary has the other parameters and their spread. hoid study check \
          lists the cells by number.\n"
     )

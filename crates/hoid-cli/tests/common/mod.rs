@@ -47,7 +47,8 @@ pub fn json_with_any_exit_code(directory: &Path, arguments: &[&str]) -> Value {
     found
 }
 
-/// Returns exit code and message of a command that fails; it must print nothing on standard output and leave no file.
+/// Returns the exit code and message of a command that fails; it must print nothing on standard output and leave no
+/// file.
 pub fn failure_of(directory: &Path, arguments: &[&str]) -> (i32, String) {
     let files = |d: &Path| fs::read_dir(d).unwrap().count();
     let before = files(directory);

@@ -28,7 +28,7 @@ pub fn run(at: &Path, command: &str, stdin: Option<&str>) -> Output {
         .unwrap()
 }
 
-/// Returns exit code, standard output, and rows of the written tables.
+/// Returns the exit code, the standard output, and rows of the written tables.
 pub fn of(at: &Path, call: &Call) -> Value {
     let out = |text: &str| text.replace("{out}", &call.name);
     let done = run(at, &out(&call.command), call.stdin.as_deref());

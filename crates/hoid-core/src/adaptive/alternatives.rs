@@ -7,7 +7,8 @@
 //! operator, and f is the fraction of the currently replayed samples that had been read at the time of the trial. The
 //! scatter about the estimate is `sum w d d'/(1 + sum w)`, where d is the difference between the operator and the
 //! estimate. The evidence is tempered, since it assumes that the model is right (P. Grunwald and T. van Ommen,
-//! *Bayesian Analysis* 12 (2017) 1069-1103). The factor f^2 removes results that later samples have superseded.
+//! *Bayesian Analysis* 12 (2017) 1069-1103). The factor f^2 gradually removes results that later samples have
+//! superseded.
 
 use super::sizes::{PARAMETER_COUNT, START_COUNT};
 
@@ -102,7 +103,7 @@ mod tests {
         // If half of the replayed samples are new, its weight is 1/4; if all are, it is zero.
         assert!((all.scatter(0, &about, 175, 150)[2][2] - 0.8).abs() < 1e-12);
         assert_eq!(all.scatter(0, &about, 250, 150)[2][2], 0.0);
-        // The same operator again, with a much larger deficit.
+        // With a much larger deficit, the same operator has almost no weight.
         all.store(0, [other], 300.0, 200);
         assert!(all.scatter(0, &about, 200, 150)[2][2] < 1e-9);
         all.store(START_COUNT, [other], 0.0, 200);

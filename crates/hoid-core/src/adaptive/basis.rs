@@ -42,7 +42,7 @@ const N: usize = SIGNAL_COUNT - 1;
 const M: usize = N + 2;
 type SquareMatrix = [[f64; M]; M];
 
-/// Complex number as real and imaginary part.
+/// Complex number, given by its real and imaginary parts.
 pub type Complex = [f64; 2];
 /// Signals `z_0 .. z_5` of the basis.
 pub type Signals = [f64; SIGNAL_COUNT];
@@ -277,8 +277,8 @@ impl Basis {
         r
     }
 
-    /// Returns the weights of the signals in the response `sum_i theta_i (r_i + sum_j c_j dr_i/dj)` with the gains theta
-    /// and the corrections c.
+    /// Returns the weights of the signals in the response `sum_i theta_i (r_i + sum_j c_j dr_i/dj)` with the gains
+    /// theta and the corrections c.
     pub fn weights(&self, gains: &[f64; GAIN_COUNT], corrections: &[f64; DYNAMICS_COUNT]) -> Signals {
         let Point { omega, zeta, .. } = self.point;
         let (p, q) = (2.0 * zeta * omega, omega * omega);

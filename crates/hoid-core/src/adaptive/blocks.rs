@@ -99,7 +99,7 @@ impl<const S: usize, const P: usize> Block<S, P> {
     }
 
     /// Returns the block with a normal prior of the dynamics, of the given mean and standard deviations, added to its
-    /// sums. Only the numbers of the corrections are used.
+    /// sums. Only the entries for the corrections are used.
     pub fn with_prior(mut self, mean: &[f64; S], deviations: &[f64; S]) -> Self {
         let mut diagonal = 0;
         for i in 0..S {

@@ -34,8 +34,8 @@ use crate::state::{State, visit_all};
 
 /// Magnitude of a signal beyond which the filters are reset.
 pub(super) const MAX_SIGNAL: f64 = 1e100;
-/// `BASIS_POINT_RANGE` limits the basis point (omega in rad/s, zeta, tau in s), and `CORRECTION_RANGE` limits the change of
-/// the basis point in one step (relative for omega and zeta, in s for tau).
+/// `BASIS_POINT_RANGE` limits the basis point (omega in rad/s, zeta, tau in s), and `CORRECTION_RANGE` limits the
+/// change in the basis point in one step (relative for omega and zeta, in s for tau).
 const BASIS_POINT_RANGE: [[f64; 2]; DYNAMICS_COUNT] = [[3.0, 35.0], [0.05, 1.4], [0.01, 0.85]];
 const CORRECTION_RANGE: [[f64; 2]; DYNAMICS_COUNT] = [[-0.3, 0.4], [-0.4, 0.6], [-0.05, 0.05]];
 /// Frequencies in rad/s at which K_e and K_e_dot are fitted to the numerator of the operator.
@@ -245,8 +245,9 @@ impl<const I: usize, const S: usize, const M: usize, const P: usize> Candidate<I
             return false;
         }
         if self.predicted > 0 {
-            // D filters the last p outputs. A predicted output lacks the noise v and increases the innovations while it
-            // is in the filter. After n consecutive predictions, n samples are therefore not used, at most p.
+            // D filters the last p outputs. A predicted output lacks the noise v, so it increases the innovations while
+            // it is in the filter. As many samples are skipped as there were predictions, at most p; the last
+            // predictions may then still be in the filter.
             self.predicted -= 1;
             self.blocks.ignore_sample();
             return true;
@@ -342,7 +343,7 @@ impl<const I: usize, const S: usize, const M: usize, const P: usize> Candidate<I
                 *v -= response(&weights[input], z);
             }
         }
-        // After a change of the operator, v contains the unmodelled part of the response. The weight
+        // After a change in the operator, v contains the unmodelled part of the response. The weight
         // `min(1, c sigma^2/eps^2)` limits the contribution of samples with a large residual to the sums of D.
         let eps = v[0] + self.d.iter().zip(&v[1..]).map(|(d, v)| d * v).sum::<f64>();
         let excess = eps * eps / (CLIP_VARIANCES * self.predictive_variance[0]);
@@ -366,8 +367,8 @@ impl<const I: usize, const S: usize, const M: usize, const P: usize> Candidate<I
         }
         *rests_on = (*rests_on + n).min(VARIANCE_MEMORY_S / ts).max(n);
         *predictive_variance = (*predictive_variance + n / *rests_on * (energy / n - *predictive_variance)).max(least);
-        // The variance in the predictive density follows the mean energy of the blocks with a memory that grows to at
-        // most LEVEL_S.
+        // The variance in the predictive density follows the mean energy per sample with a memory that grows to at most
+        // `VARIANCE_MEMORY_S`.
         let left = self.mixture.update([&early, &late], &self.bases, prior, &self.scales);
         if settled {
             self.volatility.add(left, n);
@@ -461,8 +462,8 @@ impl<const I: usize, const S: usize, const M: usize, const P: usize> Candidate<I
         input_part(self.mixture.mean(), input).0
     }
 
-    /// As [`Candidate::response`], with the derivatives of the real and imaginary parts with respect to the state. The
-    /// derivatives are exact for the gains and finite differences for the corrections.
+    /// Like [`Candidate::response`], with the derivatives of the real and imaginary parts with respect to the state.
+    /// The derivatives are exact for the gains and finite differences for the corrections.
     pub fn response_with_derivatives(&self, input: usize, omega_rad_s: f64) -> (Complex, [[f64; S]; 2]) {
         let (gains, basis, point) = (self.gains(input), self.bases.of(input), self.points()[input]);
         let h = basis.response(omega_rad_s, point);

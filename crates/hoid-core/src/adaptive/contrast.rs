@@ -1,7 +1,7 @@
 //! Difference between two spans of data: two least-squares solutions, with a covariance estimated from their scores.
 //!
-//! The noise model whitens the residuals, but it estimates the spectrum in the frequency band of manual control from
-//! few data: 16 lags at 100 Hz cover 0.16 s, whereas people act within seconds. Where that spectrum is wrong by a
+//! The noise model whitens the residuals, but it resolves the spectrum in the frequency band of manual control poorly:
+//! 16 lags at 100 Hz cover 0.16 s, whereas people's responses last for seconds. Where that spectrum is wrong by a
 //! factor, `sigma^2 A^-1` is wrong by the same factor. The covariance of the score `g = b - A x` is therefore estimated
 //! from the data as well (the sandwich of P. J. Huber, *Proc. Fifth Berkeley Symposium* 1 (1967) 221-233; H. White,
 //! *Econometrica* 48 (1980) 817-838). With the scores `g_k` of stretches of one second, which are nearly independent
@@ -17,7 +17,7 @@
 //! `d = x_1 - x_0`, `C = A_0^-1 W_0 A_0^-1 + A_1^-1 W_1 A_1^-1`.
 //!
 //! sigma^2 and S are common to both spans. With a separate variance for each span, a quiet second or a stronger remnant
-//! would count as a change of the operator.
+//! would count as a change in the operator.
 
 use hoid_numerics::{cholesky, products::dot};
 
@@ -27,8 +27,8 @@ pub(super) type Matrix<const S: usize> = [[f64; S]; S];
 
 /// Number of blocks over which each score is summed.
 const BLOCKS_PER_SCORE: usize = 2;
-/// Weight w of the covariance estimated from the scores. `MODEL_ONLY_WEIGHT` is the weight at which only the covariance given
-/// by the noise model is used.
+/// Weight w of the covariance estimated from the scores. `MODEL_ONLY_WEIGHT` is the weight at which only the covariance
+/// given by the noise model is used.
 pub(super) const EMPIRICAL_WEIGHT: f64 = 2.0 / 3.0;
 pub(super) const MODEL_ONLY_WEIGHT: f64 = 0.0;
 /// Lower limit of the divisor of S.
@@ -181,7 +181,7 @@ impl<'b, const S: usize, const P: usize> SolvedSpans<'b, S, P> {
     }
 }
 
-/// Sum of the squares `g_k g_k'` of the scores of stretches of one second, and the number of stretches.
+/// Sum of the outer products `g_k g_k'` of the scores of stretches of one second, and the number of stretches.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Scores<const S: usize> {
     squares: Matrix<S>,
@@ -289,8 +289,8 @@ pub(super) mod tests {
         all
     }
 
-    /// Returns the mean of T and its standard error over a number of pairs of 60 blocks before and 10 blocks after, and
-    /// the mean with the covariance given by the noise model.
+    /// Returns the mean of T and its standard error over a number of pairs of spans (60 blocks before, 10 blocks
+    /// after), and the mean of T with the covariance given by the noise model.
     fn mean_distance(noise_pole: f64, runs: usize, seed: u64) -> [f64; 3] {
         let mut random = seed;
         let (mut sum, mut square, mut by_model) = (0.0, 0.0, 0.0);

@@ -34,7 +34,7 @@ pub const START_TIME_S: f64 = 1.0;
 /// Span in s of the data that are replayed.
 pub const REPLAY_SPAN_S: f64 = 100.0;
 
-/// Default prior of the changes of the operator.
+/// Default prior of the changes in the operator.
 const CHANGE_PRIOR: ChangePrior = ChangePrior {
     block: 0.32,
     mean_interval_s: 180.0,
@@ -70,23 +70,23 @@ const STARTING_POINTS: [[f64; 3]; START_COUNT] = [
 const FURTHER_STARTING_DELAYS: [f64; START_COUNT] = [0.0, -0.08, 0.1, 0.1, -0.08, 0.1, 0.1, 0.0];
 /// Shortest delay of a starting point in s.
 const SHORTEST_DELAY_S: f64 = 0.03;
-/// Spans of the detector in s: `PRESENT_LENGTHS_S` contains the lengths of the short and the long present, `PAST_LENGTHS_S` the
-/// smallest and the largest length of the past, and `REFRACTORY_PERIOD_S` is the time after a change in which no other change
-/// is declared.
+/// Spans of the detector in s: `PRESENT_LENGTHS_S` contains the lengths of the short and the long present,
+/// `PAST_LENGTHS_S` the smallest and the largest length of the past, and `REFRACTORY_PERIOD_S` is the time after a
+/// change in which no other change is declared.
 const PRESENT_LENGTHS_S: [f64; 2] = [4.0, 8.0];
 const PAST_LENGTHS_S: [f64; 2] = [15.0, 40.0];
 const REFRACTORY_PERIOD_S: f64 = 8.0;
-/// Threshold in nats for an accepted rate of one false alarm per hour; `THRESHOLD_SLOPE` is its decrease per unit of the
-/// logarithm of the rate. By chance alone, one of the 7200 blocks in an hour exceeds 8.9 nats, but people vary more
-/// than the model. In 3.8 hours of recordings of three pilots without a change, there were 2.5 alarms per hour at 15 nats
-/// and 10 at 10.2 nats.
+/// Threshold in nats for an accepted rate of one false alarm per hour; `THRESHOLD_SLOPE` is its decrease per unit of
+/// the logarithm of the rate. By chance alone, on average one of the 7200 blocks in an hour exceeds 8.9 nats, but
+/// people vary more than the model. In 3.8 hours of recordings of three pilots without a change, there were 2.5 alarms
+/// per hour at 15 nats and 10 at 10.2 nats.
 const THRESHOLD_NATS: f64 = 15.0;
 const THRESHOLD_SLOPE: f64 = 3.3;
-/// Prior standard deviation of a change of the delay in s.
+/// Prior standard deviation of a change in the delay in s.
 const DELAY_CHANGE_DEVIATION_S: f64 = 0.05;
 
-/// Returns the prior of the delay of a further input, for a delay in s as in [`DefaultOperator::with_delay`]; `is_given` is
-/// true if the user gave this delay.
+/// Returns the prior of the delay of a further input, for a delay in s as in [`DefaultOperator::with_delay`];
+/// `is_given` is true if the user gave this delay.
 pub fn further_delay(tau: f64, is_given: bool) -> DelayPrior {
     DelayPrior {
         tau,

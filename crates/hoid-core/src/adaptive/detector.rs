@@ -1,4 +1,4 @@
-//! Detector of changes of the operator: a Wald test that compares the last few seconds with the preceding data, over
+//! Detector of changes in the operator: a Wald test that compares the last few seconds with the preceding data, over
 //! blocks of half a second (`blocks`).
 //!
 //! Least squares over the latest blocks (the present) and over the preceding blocks (the past), with gains, natural
@@ -12,7 +12,7 @@
 //! changes take more data to detect than large ones. One second between past and present is left out, since a change
 //! need not coincide with the border of a block.
 //!
-//! A third statistic, for the short present, supposes that only gain and lead change (`gain_and_lead`). It has 2 degrees
+//! A third statistic, for the short present, assumes that only gain and lead change (`gain_and_lead`). It has 2 degrees
 //! of freedom. With further inputs there is such a statistic for each response. A statistic of all parameters of one
 //! response, with those of the others free, would have little power: a few seconds of data show that u is predicted
 //! worse, but hardly which response changed.
@@ -35,8 +35,8 @@
 //! **Response that changed.** A change is often declared within a second, when the outputs are still limited about the
 //! old estimate and the whitening filter contains outputs from before the change. So few data do not show which of two
 //! responses changed. With further inputs, the changed parameters are therefore estimated again when the present has
-//! the length of the long present, without the data next to the change. In 51 simulated changes of one or both
-//! responses, 25 were named correctly when they were declared, and 47 afterwards.
+//! the length of the long present, without the data next to the change. Of 51 simulated changes in one or both
+//! responses, 25 were attributed to the right responses when they were declared, and 47 after the second estimate.
 //!
 //! The blocks come from the live candidate (`last_blocks`) and use its noise model and basis. From four seconds after a
 //! gap, the data recorded after the gap are compared with those recorded before it.
@@ -137,7 +137,7 @@ fn log_significance(x: f64, pairs: u32) -> f64 {
     half - libm::log(sum)
 }
 
-/// Detector of changes of the operator.
+/// Detector of changes in the operator.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Detector<const I: usize, const S: usize> {
     settings: DetectorSettings,
@@ -152,7 +152,7 @@ pub struct Detector<const I: usize, const S: usize> {
     innovation_variances: [f64; 2],
     difference: Difference<S>,
     ago: usize,
-    /// Number of blocks that were known at the last declared change, if its parameters are to be estimated again;
+    /// Number of blocks that were available at the last declared change, if its parameters are to be estimated again;
     /// otherwise zero.
     preliminary: usize,
     revised: bool,
@@ -300,7 +300,7 @@ impl<const I: usize, const S: usize> Detector<I, S> {
         }
     }
 
-    /// Solves past and present, each with the prior of the corrections.
+    /// Solves the normal equations of the past and of the present, each with the prior of the corrections.
     fn solve<'b, const P: usize>(
         &self,
         sides: [&'b [Block<S, P>]; 2],
@@ -315,13 +315,13 @@ impl<const I: usize, const S: usize> Detector<I, S> {
         SolvedSpans::new(sides, |sum| sum.with_prior(mean, &deviations))
     }
 
-    /// Returns the time in s between the last declared change and its declaration.
+    /// Returns the time in s from the last change to its declaration.
     pub fn detection_delay_s(&self) -> f64 {
         self.ago as f64 * BLOCK_S
     }
 
-    /// Returns the log significance in nats at the last block: the largest of the statistics, where that of gain and
-    /// lead counts 1.9 times; zero while there are too few blocks.
+    /// Returns the log significance in nats at the last block: the largest over the statistics, with that of gain and
+    /// lead multiplied by 1.9; zero while there are too few blocks.
     pub fn log_significance(&self) -> f64 {
         let all = self.statistics.iter().map(|s| s.log_significance);
         let of_gain_and_lead = self

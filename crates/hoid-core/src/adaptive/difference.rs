@@ -1,10 +1,10 @@
 //! Selection of the parameters that changed, in groups, from the difference between present and past.
 //!
 //! Between past and present, gains, level and dynamics differ by d, with the covariance C (`contrast`) and `W = C^-1`.
-//! The data do not distinguish all components of d: a longer delay has nearly the same effect as a combined change of
-//! the gains, and a few seconds of data hardly separate the two. Each group (natural frequency and damping; the gains of
-//! each input; the delay of each input) is therefore treated as either changed or unchanged; the level always counts as
-//! changed. For the set S of the components that changed,
+//! The data do not distinguish all components of d: a longer delay has nearly the same effect as a combined change in
+//! the gains, and a few seconds of data hardly separate the two. Each group (natural frequency and damping; the gains
+//! of each input; the delay of each input) is therefore treated as either changed or unchanged; the level always counts
+//! as changed. For the set S of the components that changed,
 //!
 //! `d_S = (W_SS)^-1 (W d)_S`, with the covariance `(W_SS)^-1`,
 //!
@@ -63,7 +63,7 @@ impl ParameterGroup {
 /// Parameters that changed, with the sizes of their changes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Difference<const S: usize> {
-    /// Changes of all states; zero for parameters that did not change.
+    /// Changes in all states; zero for parameters that did not change.
     pub value: [f64; S],
     /// Covariance of `value`.
     pub covariance: [[f64; S]; S],
@@ -188,7 +188,7 @@ mod tests {
 
     #[test]
     fn smallest_explaining_set_of_changes_is_reported() {
-        // Only the delay changed; compared with their own errors, neither the gains nor the delay differ by much.
+        // Only the delay changed; compared with their own errors, neither the gains nor the delay differs by much.
         let reported = Difference::of(&contrast([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.5])).unwrap();
         assert_eq!(changed(&reported), [ParameterGroup::Delay(0)]);
         assert!((reported.value[6] - 1.5).abs() < 1e-9 && reported.value[0] == 0.0);

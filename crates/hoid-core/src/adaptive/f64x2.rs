@@ -1,7 +1,8 @@
 //! Pair of f64 numbers for one vector register.
 //!
-//! Every processor with vector registers can operate on two f64 numbers at an address that is a multiple of 16 bytes.
-//! Each number of the pair is computed as by a scalar operation, so the results are bit-identical on every machine.
+//! Common 64-bit processors have vector registers for two f64 numbers; the pair is aligned to the 16 bytes of such a
+//! register. Each number of the pair is computed as by a scalar operation, so the results are bit-identical on every
+//! machine.
 
 use core::ops::{Add, AddAssign, Div, Mul, Sub, SubAssign};
 

@@ -38,7 +38,7 @@ const TRUST_DEVIATIONS: [f64; DYNAMICS_COUNT] = [0.15, 0.3, 0.03];
 const REPLAY_RUN_IN_S: f64 = 2.0;
 /// Time in s for which the signals must be constant before their samples no longer update the estimate.
 const STATIONARY_AFTER_S: f64 = 0.1;
-/// Time in s in which the filters settle after a span of constant signals.
+/// Time in s that the filters take to settle after a span of constant signals.
 const SETTLING_S: f64 = 2.0;
 
 /// Adaptive recursion. E is the memory for past samples and I the number of inputs; S ([`state_count`]), M
@@ -143,8 +143,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
 }
 
 impl<E: AsRef<[f64]> + AsMut<[f64]>> TwoInputFilter<E> {
-    /// Builds the recursion with a further input at rest, given the prior of its delay. The memory is that for two
-    /// inputs, otherwise as for [`AdaptiveFilter::new`].
+    /// Builds the recursion at rest with a further input, given the prior of its delay. `memory` is that for two
+    /// inputs; otherwise as for [`AdaptiveFilter::new`].
     pub fn with_further_input(prior: AdaptivePrior, further: DelayPrior, memory: E) -> Option<Self> {
         Self::with_inputs(prior, [further], memory)
     }
@@ -365,9 +365,9 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>, const I: usize, const S: usize, const M: us
         }
     }
 
-    /// True once no signal has changed for longer than `STATIONARY_AFTER_S`, and afterwards until the filters have settled.
-    /// The estimate is then not updated: the recorder has stopped or the person is resting, and the innovation variance
-    /// would tend to zero.
+    /// True once no signal has changed for longer than `STATIONARY_AFTER_S`, and afterwards until the filters have
+    /// settled. The estimate is then not updated: the recorder has stopped or the person is resting, and the innovation
+    /// variance would tend to zero.
     #[inline(always)]
     fn is_stationary(&mut self, u: f64) -> bool {
         let samples = self.history.sample_count();

@@ -1,25 +1,25 @@
-//! Test of gain and lead: has the present another gain or lead than the past, if all else is as in the past?
+//! Test of gain and lead: whether they differ between past and present if everything else is as in the past.
 //!
 //! People who adapt to another controlled element change mainly their gain and lead (D. T. McRuer and H. R. Jex, *IEEE
 //! Trans. Human Factors in Electronics* 8 (1967) 231-249). A test of these two has more power than the test of all
 //! parameters (`contrast`), since a few seconds of data hardly determine the others. Let x_0 be the least-squares
 //! solution of the past with covariance `C_0 = A_0^-1 W_0 A_0^-1`, and E the directions of gain, lead and level in the
-//! state. The score of the present at x_0 gives the change (C. R. Rao, *Proc. Cambridge Philosophical Society* 44 (1948)
-//! 50-57)
+//! state. The score of the present at x_0 gives the change (C. R. Rao, *Proc. Cambridge Philosophical Society* 44
+//! (1948) 50-57)
 //!
 //! `delta = F^-1 E' (b_1 - A_1 x_0)`, `F = E' A_1 E`, `C = F^-1 E' (W_1 + A_1 C_0 A_1) E F^-1`.
 //!
-//! W_0 and W_1 come from the scores of the past alone: a change adds to those of the present.
+//! W_0 and W_1 come from the scores of the past alone: a change would increase those of the present.
 //!
-//! The gain of people fluctuates without a change of their strategy, while the ratio of lead and gain remains. A
+//! The gain of people fluctuates without a change in their strategy, while the ratio of lead to gain stays constant. A
 //! fluctuation with a standard deviation of 20 % is therefore part of the covariance: with the gain and lead h of the
 //! past, and the first two components of delta and C,
 //!
 //! `T = delta' (C + 0.04 h h')^-1 delta`,
 //!
-//! which is at most a chi-square with two degrees of freedom if there is no change: the correction of W for the few
-//! stretches it comes from is that of a test of all parameters, so T is on average 1.4 for 2. In recordings of three
-//! pilots, this T at two false alarms per hour finds 64 % of sudden changes of the controlled element within 10 s; T
+//! which is at most a chi-square with two degrees of freedom if there is no change: W comes from few stretches, and its
+//! divisor is that of a test of all parameters, so the mean of T is 1.4 instead of 2. In recordings of three pilots,
+//! this T at two false alarms per hour finds 64 % of the sudden changes of the controlled element within 10 s; T
 //! without the fluctuation finds 49 %, and the test of all parameters 35 %.
 
 use hoid_numerics::{
@@ -128,8 +128,8 @@ mod tests {
         wald_statistic(&SolvedSpans::new([&before, &now], |sum| sum).unwrap(), 0, DIRECTIONS).unwrap()
     }
 
-    /// Without gain and lead there is no fluctuation, so T is about a chi-square with two degrees of freedom, with mean 2
-    /// and standard deviation 2. The correction for few stretches reduces T.
+    /// With a gain and lead of zero there is no fluctuation, so T is about a chi-square with two degrees of freedom,
+    /// with mean 2 and standard deviation 2. The correction for few stretches reduces T.
     #[test]
     fn statistic_without_change_is_at_most_a_chi_square() {
         let (mut random, count) = (5, 400);
@@ -139,8 +139,8 @@ mod tests {
         assert!((1.2..2.2).contains(&mean), "{mean}");
     }
 
-    /// A smaller gain with the same ratio of lead and gain is a typical fluctuation; a lead that changes by the same
-    /// amount is a change.
+    /// A smaller gain with the same ratio of lead to gain is a typical fluctuation; changes of the same size that alter
+    /// the ratio are a change in the operator.
     #[test]
     fn change_of_lead_is_distinguished_from_a_fluctuation_of_the_gain() {
         let mut random = 6;
@@ -154,7 +154,7 @@ mod tests {
         );
     }
 
-    /// Parameters other than gain and lead are supposed to be as in the past, and a level that changes is no change.
+    /// Parameters other than gain and lead are assumed to be as in the past, and a change in the level does not count.
     #[test]
     fn change_of_the_level_is_no_change() {
         let mut random = 7;

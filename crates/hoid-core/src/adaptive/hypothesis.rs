@@ -12,7 +12,7 @@
 //! section 7.2, information form). `(I + P A/sigma^2)^-1 P` needs no inverse of P, which is singular if the three gains
 //! are restricted to a gain with a lead.
 //!
-//! Each hypothesis has its own innovation variance, so a change of the remnant can be part of a change. Since this
+//! Each hypothesis has its own innovation variance, so a change in the remnant can be part of a change. Since this
 //! variance is estimated, the part of the block energy common to all hypotheses has a Student density with the degrees
 //! of freedom of the variance (A. Zellner, *An Introduction to Bayesian Inference in Econometrics*, 1971, section 3.2).
 
@@ -22,7 +22,7 @@ use super::{bases::Bases, moments::Moments, segments::Segment, sizes::MAX_SEGMEN
 
 pub(super) type Covariance<const S: usize> = [[f64; S]; S];
 
-/// Hypothesis about the last change of the operator.
+/// Hypothesis about the last change in the operator.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Hypothesis<const S: usize> {
     pub state: [f64; S],

@@ -11,7 +11,8 @@ use super::blocks::{Block, Row};
 pub const MAX_BLOCKS: usize = 96;
 /// Length of a block in s.
 pub const BLOCK_S: f64 = 0.5;
-/// Time in s from which unused samples count as a gap; `SKIPPED_AFTER_GAP_S` is the time that is skipped after a gap.
+/// Shortest time in s for which unused samples count as a gap; `SKIPPED_AFTER_GAP_S` is the time that is skipped after
+/// a gap.
 const MIN_GAP_S: f64 = 0.25;
 const SKIPPED_AFTER_GAP_S: f64 = 2.0;
 
@@ -156,7 +157,7 @@ mod tests {
         let mut last = LastBlocks::<STATE_COUNT, PRODUCT_COUNT>::new(0.05);
         (0..25).for_each(|_| last.add(&ROW));
         assert_eq!(last.blocks().len(), 2);
-        // First fewer unused samples than in a gap, then a gap.
+        // Fewer unused samples than in a gap have no effect; a gap removes the last block.
         (0..4).for_each(|_| last.count_unused_sample());
         last.add(&ROW);
         assert_eq!(last.blocks().len(), 2);

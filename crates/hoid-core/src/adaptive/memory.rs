@@ -1,5 +1,5 @@
-//! Length of the memory of a filter: the errors of the longest delay, twice for the history and its replay, and the
-//! samples of a replay, for each signal.
+//! Length of the memory of a filter. For each signal it holds the samples of a replay and, for the history and for its
+//! replay, as many samples as the longest delay needs.
 
 use super::{history::ring_count, prior::LONGEST_DELAY_S};
 

@@ -1,4 +1,4 @@
-//! Mixture of hypotheses about the time of the last change of the operator.
+//! Mixture of hypotheses about the time of the last change in the operator.
 //!
 //! After each block the likeliest hypothesis of each class has a child, which assumes that the operator changed in this
 //! block. The child has the estimate of its parent before the block, with the covariance of a jump added to the
@@ -10,9 +10,9 @@
 //! changes the estimate therefore uses all data since the last change.
 //!
 //! **Samples that a child skips.** For up to p samples after a change, a whitening filter D of order p contains
-//! responses with the gains before and after the change: it computes `D (theta r)`, whereas the model computes theta
-//! `D r`. With a steep remnant the difference amounts to hundreds of innovations, which no gains explain. A child
-//! therefore skips the block of its birth and the first p samples of the next block.
+//! responses with the gains before and after the change: it computes `D (theta r)`, whereas the model computes
+//! `theta D r`. With a steep remnant the difference amounts to hundreds of standard deviations of the innovations,
+//! which no gains explain. A child therefore skips the block of its birth and the first p samples of the next block.
 //!
 //! **Classes.** The numerator is either free or restricted to a gain with a lead, `(K_e + K_e_dot s)(s + a)`; the
 //! restricted form uses the same filter, with a covariance that allows no other direction of the gains. In both forms
@@ -35,14 +35,14 @@ use super::{
     sizes::{CLASS_COUNT, GAIN_COUNT, MAX_HYPOTHESES, first_gain, is_correction},
 };
 
-/// Prior of the changes of the operator. Gains are in units of |Y| at the reference frequency.
+/// Prior of the changes in the operator. Gains are in units of |Y| at the reference frequency.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChangePrior {
     /// Length of a block in s.
     pub block: f64,
     /// Mean time between changes in s.
     pub mean_interval_s: f64,
-    /// Standard deviations of a change of the gain and of a change of the lead term at 2 rad/s.
+    /// Standard deviations of a change in the gain and of a change in the lead term at 2 rad/s.
     pub change_deviation: [f64; 2],
     /// Standard deviation of the drift of the gains over one second, for steady and for wandering hypotheses.
     pub drift: [f64; 2],
@@ -121,8 +121,8 @@ pub(super) struct Mixture<const S: usize> {
 crate::state!([const S: usize] Mixture<S> { hypotheses, count, blocks, mean });
 
 impl<const S: usize> Mixture<S> {
-    /// Returns a mixture with one hypothesis of each class, all at the prior. `dynamics` contains the prior variances of
-    /// the corrections; its other numbers are zero.
+    /// Returns a mixture with one hypothesis of each class, all at the prior. `dynamics` contains the prior variances
+    /// of the corrections; its other numbers are zero.
     pub fn new<const I: usize>(
         prior: &ChangePrior,
         bases: &Bases<I>,
@@ -420,7 +420,7 @@ impl<const S: usize> Mixture<S> {
     /// Replaces the prior of the corrections. The old prior is normal with mean zero and variances `was`, the new
     /// prior, for people, is normal with `mean` and variances `is`: `P' = (I + P D)^-1 P`, `D = 1/is - 1/was`,
     /// `x' = x + P' (mean/is - D x)`. In information form this subtracts the old prior and adds the new one. Only the
-    /// numbers of the corrections are used.
+    /// entries for the corrections are used.
     pub fn replace_prior(&mut self, was: &[f64; S], is: &[f64; S], mean: &[f64; S]) {
         for h in self.hypotheses_mut() {
             let mut matrix: Covariance<S> = [[0.0; S]; S];
@@ -462,9 +462,9 @@ pub(super) fn gain_and_lead_directions(basis: &Basis) -> [[f64; GAIN_COUNT]; 2] 
     ]
 }
 
-/// Adds variances to the covariance of the gains of all inputs (for `Q_j`, the jump of a child, or the prior): along gain
-/// and lead, or in all directions if the class has a free numerator. The deviations are relative to the units of the
-/// inputs.
+/// Adds variances to the covariance of the gains of all inputs (for `Q_j`, the jump of a child, or the prior): along
+/// gain and lead, or in all directions if the class has a free numerator. The deviations are relative to the units of
+/// the inputs.
 fn inflate_gains<const I: usize, const S: usize>(
     p: &mut Covariance<S>,
     bases: &Bases<I>,
@@ -577,7 +577,7 @@ mod tests {
 
     #[test]
     fn blocks_shorter_than_the_whitening_filter_are_allowed() {
-        // A child then skips its whole first block, and its variance is that of the next blocks.
+        // A child then skips its whole first block, and its variance comes from the next blocks.
         let all = gain_distance(32, 63);
         assert!(all < 0.2, "{all}");
     }

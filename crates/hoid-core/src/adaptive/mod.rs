@@ -34,7 +34,7 @@
 //!     bounded cost per sample.
 //! 12. **Change test** ([`detector`], [`contrast`], [`difference`]). Least-squares fits before and after a possible
 //!     change give `T = d' C^-1 d` (Wald; G. C. Chow, *Econometrica* 28 (1960) 591-605; H. White, *Econometrica* 48
-//!     (1980) 817-838). The test of `gain_and_lead` supposes that nothing else changes, and needs fewer data.
+//!     (1980) 817-838). The test of `gain_and_lead` assumes that nothing else changes, and needs fewer data.
 //!
 //! | this module | BLK | filterpy `IMMEstimator` | difference |
 //! |---|---|---|---|
@@ -43,13 +43,13 @@
 //! | `inflate_gains` | `Q_j` | `filters[j].Q` | the drift decays after a birth |
 //! | `log_weight`, `weigh` | `mu_j`, `Lambda_j` | `mu[j]`, `likelihood` | Student density, since sigma_j^2 is estimated |
 //! | `mean`, `covariance` | `x^`, `P` | `x`, `P` | none |
-//! | `child`, `births` | transition p_ij | `M` | births by run length (AM), with P of the parent plus a jump (WJ) |
+//! | `child`, `add_children` | transition p_ij | `M` | births by run length (AM), with P of the parent plus a jump (WJ) |
 //! | `free_slot` | merging | mixing | the least likely hypothesis is pruned; no hypotheses are merged |
 //!
-//! **Time per step.** No step reads more than [`REPLAY_SAMPLES_PER_STEP`] stored samples, so the number of operations is bounded. For
-//! two minutes of data at 50 to 200 Hz, the longest step takes 77 us without replays, at the end of a block. With
-//! replays over 100 s the longest step takes 193 to 339 us. The mean is 1 to 2 us without and 28 to 80 us with replays
-//! (one core of a shared server: `cargo xtask slow step-time`).
+//! **Time per step.** No step reads more than [`REPLAY_SAMPLES_PER_STEP`] stored samples, so the number of operations
+//! is bounded. For two minutes of data at 50 to 200 Hz, the longest step takes 77 us without replays, at the end of a
+//! block. With replays over 100 s the longest step takes 193 to 339 us. The mean is 1 to 2 us without and 28 to 80 us
+//! with replays (one core of a shared server: `cargo xtask slow step-time`).
 //!
 //! Outputs at a limit of the stick are censored samples (`saturation`). Operators with other poles and delays that
 //! predict u about as well as the estimate widen the reported errors (`alternatives`). The estimate starts either after
@@ -66,7 +66,7 @@
 //! let person = DefaultOperator::with_delay(0.2);
 //! let mut tracker = AdaptiveFilter::new(person.prior(SAMPLE_TIME_S), [0.0; MEMORY]).ok_or("no filter")?;
 //!
-//! // Two minutes of an operator with a gain of 0.5, muscles of 11 rad/s and a delay of 0.2 s; some noise.
+//! // Two minutes of an operator with a gain of 0.5, a neuromuscular system of 11 rad/s, a delay of 0.2 s, and noise.
 //! let (mut u, mut rate, mut late, mut draw) = (0.0, 0.0, [0.0; 10], 1_u32);
 //! for k in 0..6000_u32 {
 //!     let t = f64::from(k) * SAMPLE_TIME_S;

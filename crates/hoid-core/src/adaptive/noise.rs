@@ -294,9 +294,9 @@ mod tests {
 
     #[test]
     fn covariance_of_d_matches_the_scatter() {
-        // Squared errors of four coefficients in 100 runs, in standard errors: their mean has a standard error of .07,
-        // or .14 if the four were fully correlated. This is tested while the memory grows and when it has its full
-        // length.
+        // Squared errors of four coefficients in 100 runs, divided by their variances: their mean has a standard error
+        // of .07, or .14 if the four were fully correlated. This is tested while the memory grows and when it has its
+        // full length.
         for memory in [1000.0, 10.0] {
             let (mut squares, mut seed) = (0.0, 11);
             for _ in 0..100 {

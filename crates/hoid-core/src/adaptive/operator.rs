@@ -1,9 +1,9 @@
 //! Reported operator: its parameters and their covariance, computed from gains and corrections.
 //!
-//! K_e and K_e_dot describe the gain and lead nearest to the numerator at [`FIT_FREQUENCIES_RAD_S`], by least squares in `K_e +
-//! K_e_dot j omega = Y e^{j tau omega} (1 - omega^2/omega_nm^2 + 2 j zeta omega/omega_nm)`; this is exact for an
-//! operator with a gain and a lead. K_e and K_e_dot are linear in the state, so their covariance is `M P M'`, where M
-//! maps the state to them and P is the covariance of the mixture ([`super::mixture`]). The scatter of other operators
+//! K_e and K_e_dot describe the gain and lead nearest to the numerator at [`FIT_FREQUENCIES_RAD_S`], by least squares
+//! in `K_e + K_e_dot j omega = Y e^{j tau omega} (1 - omega^2/omega_nm^2 + 2 j zeta omega/omega_nm)`; this is exact for
+//! an operator with a gain and a lead. K_e and K_e_dot are linear in the state, so their covariance is `M P M'`, where
+//! M maps the state to them and P is the covariance of the mixture ([`super::mixture`]). The scatter of other operators
 //! that predict u about as well ([`super::alternatives`]) is added.
 
 use hoid_numerics::products::congruence;

@@ -1,4 +1,4 @@
-//! Prior for a person and for the changes of the operator.
+//! Prior for a person and for the changes in the operator.
 
 use super::{
     basis::Point,
@@ -29,7 +29,7 @@ impl DelayPrior {
     }
 }
 
-/// Prior for a person and for the changes of the operator.
+/// Prior for a person and for the changes in the operator.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AdaptivePrior {
     /// Delay, natural frequency, damping and lag of the person, the point at which the basis starts.
@@ -45,7 +45,7 @@ pub struct AdaptivePrior {
     /// Time in s after which the estimate starts. The ratio of the magnitudes of u and e over this time sets the scale
     /// of the prior of the gains.
     pub hold: f64,
-    /// Prior of the changes of the operator.
+    /// Prior of the changes in the operator.
     pub changes: ChangePrior,
     /// Starting points of the first estimate; each has the lag of the person.
     pub starts: [Point; START_COUNT],

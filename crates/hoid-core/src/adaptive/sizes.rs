@@ -19,7 +19,7 @@ pub const FURTHER_STATE_COUNT: usize = GAIN_COUNT + 1;
 pub const PARAMETER_COUNT: usize = 2 + DYNAMICS_COUNT;
 /// Number of signals of the basis of an input: the states of its filter and the derivative of the last state.
 pub const SIGNAL_COUNT: usize = 6;
-/// Number of numbers per sample in the sums of a block of a model with one input: the signals, the level and the output.
+/// Number of values per sample in the sums of a block of a model with one input: the signals, the level and the output.
 pub const SUM_COUNT: usize = SIGNAL_COUNT + 2;
 /// Number of different products of two states of a model with one input.
 pub const PRODUCT_COUNT: usize = product_count(1);
@@ -39,7 +39,7 @@ pub const fn state_count(inputs: usize) -> usize {
     STATE_COUNT + (inputs - 1) * FURTHER_STATE_COUNT
 }
 
-/// Number of numbers per sample in the sums of a block.
+/// Number of values per sample in the sums of a block.
 pub const fn sum_count(inputs: usize) -> usize {
     SUM_COUNT + (inputs - 1) * SIGNAL_COUNT
 }

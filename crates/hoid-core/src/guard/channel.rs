@@ -12,9 +12,9 @@
 //! `q <- q (1 + g (1 - p))` if `|r| > q`, else `q <- q (1 - g p)`, with p = .01, g = .05.
 //!
 //! The size of an outlier does not matter: one sample changes q by at most 5 %. A quantile in the tail is used instead
-//! of the median, because the u of a person rests and moves in pulses, and the limit must accept the tails of the
-//! distribution of its differences. p_j is the 90 % quantile, computed in the same way with g = .02. Samples at which
-//! the signal stays constant carry no information about its motion and do not affect the quantiles.
+//! of the median, because a person's u moves in pulses with rests between them, and the limit must accept the tails of
+//! the distribution of its differences. p_j is the 90 % quantile, computed in the same way with g = .02. Samples at
+//! which the signal stays constant carry no information about its motion and do not affect the quantiles.
 //!
 //! **Outliers.** A sample is held back if `|r_j| > max(m_j q_j, floor)` with
 //!
@@ -23,10 +23,10 @@
 //! averaged over about the last 20 s, since the ratio of two tracked quantiles is noisy. In a tail of the form
 //! `P(|r| > x) = exp(-(x/s)^k)` (W. Weibull, *Journal of Applied Mechanics* 18 (1951) 293-297), the value exceeded with
 //! probability P is `s (-log P)^(1/k)`. The values for P = .1 and .01 differ by the factor `2^(1/k)`, and the values
-//! for 1e-2 and 1e-8 by its square, `4^(1/k)`. The limit `m q` is therefore exceeded by one of 1e8 samples, both for a
-//! steady hand (k = 2: m = 2; a Gaussian tail gives 2.45) and for a hand that moves in bursts (k = 1: m = 4; k = .7:
-//! m = 7). With m = 2.5, Gaussian errors are held back above 6.4 standard deviations, which is one of 8e9 samples. The
-//! floor is a fraction of the mean magnitude of the signal; a smaller outlier has no effect.
+//! for 1e-2 and 1e-8 by its square, `4^(1/k)`. The limit `m q` is therefore exceeded by one in 1e8 samples, both for a
+//! steady hand (k = 2: m = 2; a Gaussian tail gives 2.45) and for a hand that moves in bursts (k = 1: m = 4; k = .7: m
+//! = 7). With m = 2.5, Gaussian errors are held back above 6.4 standard deviations, which one in 8e9 samples exceeds.
+//! The floor is a fraction of the mean magnitude of the signal; a smaller outlier has no effect.
 //!
 //! **Held-back samples.** While samples are held back, the signal is continued with its last slope, damped with the
 //! time constant [`SLOPE_TIME_CONSTANT_S`], if the order is 2 or more, and otherwise with its last value. After h
@@ -131,7 +131,7 @@ impl ChannelGuard {
         self.set_tails(quantiles, quantiles.map(|q| GAUSSIAN_INNER_RATIO * q));
     }
 
-    /// As [`ChannelGuard::set_quantiles`], with `inner` as the 90 % quantiles.
+    /// Like [`ChannelGuard::set_quantiles`], with `inner` as the 90 % quantiles.
     pub fn set_tails(&mut self, quantiles: [f64; ORDER_COUNT], inner: [f64; ORDER_COUNT]) {
         (self.quantiles, self.inner) = (quantiles, inner);
         self.averaged = 0;
@@ -424,8 +424,8 @@ mod tests {
         })
     }
 
-    /// The 99 % quantile of a Gaussian first difference of a random walk is 2.576; this approximation has a standard
-    /// error of about 8 %.
+    /// The 99 % quantile of the magnitude of the first differences of a Gaussian random walk is 2.576; this
+    /// approximation has a standard error of about 8 %.
     #[test]
     fn quantiles_converge_and_resist_outliers() {
         let (mut state, mut x) = (1, 0.0);
@@ -477,8 +477,9 @@ mod tests {
         }
     }
 
-    /// Weibull's distribution gives m = 4^(1/k): twice the quantile for k = 2, seven times for k = .7; the largest of
-    /// 1e5 samples is within the limit, a spike is not. Rests have no effect.
+    /// Weibull's distribution gives m = 4^(1/k), limited to at least 2.5: the limit is 2.5 times the quantile for k = 2
+    /// and about seven times for k = .7. The largest of 1e5 samples is within the limit, a spike is not. Rests have no
+    /// effect.
     #[test]
     fn bursts_raise_the_limit_and_spikes_are_still_detected() {
         for (shape, least, most) in [(2.0, 2.4, 2.6), (1.0, 3.0, 5.5), (0.7, 5.0, 10.5)] {

@@ -260,13 +260,13 @@ impl Profile {
             && self.misfits == 0
     }
 
-    /// True if the mean differences of a block differ from the long-run values by more than a factor of e, in the mean
-    /// of the absolute logarithms of their ratios.
+    /// True if the mean differences of a block differ from the long-run values by more than a factor of 2.7, averaged
+    /// over the absolute logarithms of their ratios.
     pub fn is_unusual(&self, block: &Block) -> bool {
         self.is_known() && self.distance(block, [0, 1]) > UNUSUAL_DISTANCE
     }
 
-    /// True if the mean differences of a block are within a factor of four of the long-run values, in the mean of the
+    /// True if the mean differences of a block are within a factor of four of the long-run values, averaged over the
     /// absolute logarithms of their ratios.
     pub fn resembles(&self, block: &Block) -> bool {
         self.is_known() && self.distance(block, [0, 1]) < SIMILAR_DISTANCE
@@ -478,7 +478,8 @@ mod tests {
         profile
     }
 
-    /// Squares that underflow: infinite innovations do not become a long-run value, and nothing panics afterwards.
+    /// Innovations that are not finite, as after an underflow of squares, do not enter the long-run values and cause no
+    /// panic.
     #[test]
     fn non_finite_innovations_do_not_enter_the_profile() {
         let mut profile = known_profile();

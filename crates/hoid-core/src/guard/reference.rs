@@ -14,7 +14,7 @@
 //! [`TOLERATED_DRIFT`] counts. The one-sided cumulative sum (E. S. Page, *Biometrika* 41 (1954) 100-115) reports a
 //! diverged estimate when it reaches [`DIVERGENCE_LIMIT`].
 //!
-//! After a change of the person, an estimate that has followed the change predicts u better than the initial model, and
+//! After a change in the person, an estimate that has followed the change predicts u better than the initial model, and
 //! the sum stays at zero.
 
 /// Highest order of a polynomial of the model.

@@ -176,12 +176,12 @@ mod tests {
         let resting = person(&[60, 150, 80, 120]);
         assert!((rest_duration_s(resting, 0.0) - 8.0).abs() < 0.02);
         assert!((rest_duration_s(person(&[60, 600, 80, 120]), 0.0) - 12.0).abs() < 0.02);
-        // A new value, and a value with a single rest.
+        // Neither a new value nor a value with a single rest counts as a rest.
         assert!(rest_duration_s(resting, 0.37) == 0.0);
         assert!(rest_duration_s(person(&[150]), 0.0) == 0.0);
     }
 
-    /// A signal that takes each of many values for a moment, as from a coarse converter.
+    /// A signal that briefly takes each of many values, as from a coarse converter, does not rest.
     #[test]
     fn quantised_values_are_not_rest_values() {
         let mut resting = RestDetector::new(0.01);

@@ -19,8 +19,8 @@ impl Noise {
     }
 }
 
-/// Returns input and output of `u = (B/F) x + (C/D) eps` with two poles of an operator at 100 Hz; x is in the units of
-/// a tracking error.
+/// Returns the input and output of `u = (B/F) x + (C/D) eps` with two poles of an operator at 100 Hz; x is in the units
+/// of a tracking error.
 pub fn box_jenkins(samples: usize, seed: u64, level: f64) -> Vec<(f64, f64)> {
     let mut noise = Noise(seed);
     let (mut w, mut x1, mut n, mut eps1, mut slow) = ([0.0; 2], 0.0, 0.0, 0.0, 0.0);
@@ -138,7 +138,7 @@ pub fn diagonal<const N: usize>(value: f64) -> [[f64; N]; N] {
     std::array::from_fn(|i| std::array::from_fn(|j| if i == j { value } else { 0.0 }))
 }
 
-/// Returns the adaptation with this rule of forgetting, P = p0 I and no bound.
+/// Returns the adaptation with this forgetting rule, P = p0 I and no bound.
 pub fn covariance<const N: usize>(p0: f64, forgetting: Forgetting<N>) -> Covariance<N> {
     Covariance::new(UdCovariance::diagonal([p0; N]), forgetting, [f64::INFINITY; N])
 }

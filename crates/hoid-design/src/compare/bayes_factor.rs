@@ -55,7 +55,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    /// Those of pingouin (scipy's adaptive quadrature).
+    /// The reference values were computed with pingouin (scipy's adaptive quadrature).
     #[test]
     fn bayes_factors_match_pingouin() {
         let mut seen = 0;
@@ -80,7 +80,7 @@ mod tests {
         ] {
             assert_eq!(bayes_factor(t, first, second), None, "{t} {first} {second}");
         }
-        // Beyond the range of numbers.
+        // The first factor exceeds the range of floating-point numbers.
         assert_eq!(bayes_factor(1e12, 400, 0), None);
         assert!(bayes_factor(1e6, 3, 0).is_some());
     }

@@ -89,7 +89,7 @@ mod tests {
         // A simpler form within 2 is preferred.
         let three = person(&[(Lead, 2.4, 0.2), (LeadLag, 0.0, 0.8)]);
         assert_eq!(common_form(&[&two, &three, &one]).unwrap().form, Lead);
-        // A form that one has not is none for all.
+        // A form that one person lacks cannot be the common form.
         let without = person(&[(Gain, 0.0, 1.0)]);
         assert_eq!(common_form(&[&two, &without]).unwrap().form, Gain);
         assert_eq!(common_form(&[]), None);

@@ -74,7 +74,7 @@ pub struct Difference {
     /// ([`bayes_factor`](super::bayes_factor)).
     #[serde(default)]
     pub bayes_factor: Option<f64>,
-    /// Standard deviation, over people, of the difference, excluding the errors of their estimates.
+    /// Standard deviation, over people, of the difference, excluding the errors of the estimates.
     pub tau: f64,
     /// Share of tau^2 in the total variance of a typical estimate (I^2).
     pub i_squared: Option<f64>,
@@ -86,7 +86,7 @@ pub struct Difference {
     pub sentence: String,
 }
 
-/// Change of a quantity from run to run, averaged over people.
+/// Change in a quantity from run to run, averaged over people.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Learning {
     /// Quantity whose change is given.

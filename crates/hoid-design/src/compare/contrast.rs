@@ -324,12 +324,12 @@ mod tests {
             .iter()
             .map(|c| (c.from.as_str(), c.to.as_str(), c.people.len()))
             .collect();
-        // Q lacks c, which is found and reported when its estimates are looked up.
+        // Q has no condition c; this is reported later, when the estimates are looked up.
         assert_eq!(pairs, [("a", "b", 2), ("a", "c", 2), ("b", "c", 2)]);
         let all = of(&three[..4], &["who:one=P;two=Q"]).unwrap();
         assert_eq!((all.len(), all[0].variation), (1, Variation::Between));
         assert_eq!(all[0].people.iter().map(|p| p.2).collect::<Vec<_>>(), [0, 1]);
-        // Each person in one condition.
+        // Each person is in only one condition.
         let all = of(&[("P", "a"), ("Q", "b"), ("R", "a")], &["condition"]).unwrap();
         assert_eq!((all[0].variation, all[0].people.len()), (Variation::Between, 3));
         assert_eq!(weights(&all[0]), [("a", 1.0)]);

@@ -117,7 +117,7 @@ mod tests {
         let axis: Factor = "axis:roll=C1r, C2r;pitch=C1p,C2p".parse().unwrap();
         assert_eq!((axis.name.as_str(), axis.levels.len()), ("axis", 2));
         assert_eq!(axis.levels[0].members, ["C1r", "C2r"]);
-        // A level that is one condition needs no other name.
+        // A level that consists of one condition needs no name of its own.
         let plant: Factor = "plant:fo;so".parse().unwrap();
         assert_eq!(
             (plant.levels[1].name.as_str(), plant.levels[1].members.len()),

@@ -68,8 +68,8 @@ impl ComparisonOptions {
     /// Computes the comparison.
     ///
     /// # Errors
-    /// The errors of invalid factors, and [`CompareError::NotInJson`] if the JSON of a group lacks a quantity. A
-    /// quantity that cannot be estimated for a person is reported in the result.
+    /// [`CompareError::Factor`] if a factor is invalid, and [`CompareError::NotInJson`] if the JSON of a group lacks a
+    /// quantity. A quantity that cannot be estimated for a person is reported in the result.
     pub fn run(&self, group: &GroupEstimates) -> Result<Comparison, CompareError> {
         let asked = match self.factors.is_empty() {
             true => vec![Factor::conditions()],

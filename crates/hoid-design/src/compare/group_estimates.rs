@@ -1,9 +1,9 @@
 //! Estimates for each person in each condition, read from the result directory of a group or from the JSON output of
 //! `hoid group`.
 //!
-//! A person in a condition is a cell. Crossover, margin and parameters come from the joint fit to all runs, with the
-//! standard errors of that fit. Root mean squares are means over the runs; responses come from the joint fit. The
-//! standard errors of root mean squares and responses are the standard deviation between runs divided by the square
+//! A person in a condition is a cell. The crossover, the margin and the parameters come from the joint fit to all runs,
+//! with the standard errors of that fit. Root mean squares are means over the runs; responses come from the joint fit.
+//! The standard error of a root mean square or a response is the standard deviation between runs divided by the square
 //! root of the number of runs. If some parameters were estimated for each run, a cell is the mean over its runs.
 
 use std::{
@@ -210,7 +210,7 @@ impl GroupEstimates {
                 ),
                 Quantity::OfInput { parameter, input } => match cell.inputs.get(input) {
                     None => format!("{input} is not an input of its model"),
-                    Some(None) => format!("it does not respond to {input}"),
+                    Some(None) => format!("no response to {input} was found"),
                     Some(Some(form)) => format!("the form {form} of its response to {input} has no {parameter}"),
                 },
                 _ => format!("its form {} has no {name}", cell.form),
@@ -460,7 +460,7 @@ pub(super) mod tests {
 
     use super::*;
 
-    /// A group of people with crossover and its standard error by condition, from the JSON of a group.
+    /// Returns a group, read from JSON, in which each person has a crossover and its standard error in each condition.
     pub fn group(people: &[(&str, &str, f64, f64)]) -> GroupEstimates {
         let person = |(subject, condition, value, error): &(&str, &str, f64, f64)| {
             json!({
@@ -535,7 +535,7 @@ pub(super) mod tests {
         assert_eq!(without.differences[0].people.len(), 2);
         let cell = group.cell("P2", "b").unwrap();
         let none = group.estimate(cell, &"tau_f[r]".parse().unwrap()).unwrap_err();
-        assert_eq!(none, "it does not respond to r");
+        assert_eq!(none, "no response to r was found");
         let none = group.estimate(cell, &"tau_f[y]".parse().unwrap()).unwrap_err();
         assert_eq!(none, "y is not an input of its model");
         let (other, _) = of([Some("gain"), Some("lead")]);

@@ -4,7 +4,7 @@
 //! people, where `v_i` is the squared standard error. With `w_i = 1/(v_i + tau^2)`, `W = diag(w)` and
 //! `P = W - W X (X'W X)^-1 X'W`:
 //!
-//! - **tau^2** maximises the restricted likelihood (D. A. Harville, *J. Am. Stat. Assoc.* 72 (1977) 320-338)
+//! - **tau^2** maximises the restricted likelihood (REML; D. A. Harville, *J. Am. Stat. Assoc.* 72 (1977) 320-338)
 //!   `l = -1/2 sum log(v_i + tau^2) - 1/2 log |X'W X| - 1/2 y'P y`, whose slope is `1/2 (y'P P y - tr P)`. The search
 //!   takes the best point of a grid and then the adjacent zero of the slope, since l may have two maxima if the errors
 //!   differ much.
@@ -77,7 +77,7 @@ pub struct Coefficient {
 pub struct MetaRegression {
     /// Coefficients, in the order of the columns of X.
     pub coefficients: Vec<Coefficient>,
-    /// Variance between people, from the restricted likelihood.
+    /// Variance between people, by restricted maximum likelihood (REML).
     pub tau_squared: f64,
     /// The tau^2 from which the weights are computed.
     pub tau_squared_of_weights: f64,
@@ -230,7 +230,8 @@ struct FitAtTau {
     slope: f64,
 }
 
-/// Range of the grid of tau^2, in decades relative to the scatter, and number of steps per decade.
+/// Range of the grid of tau^2, in decades relative to the scatter or the mean variance (whichever is larger), and the
+/// number of steps per decade.
 const DECADE_RANGE: (i32, i32) = (-8, 6);
 const STEPS_PER_DECADE: i32 = 3;
 
@@ -324,7 +325,7 @@ mod tests {
 
     use super::*;
 
-    /// y, v and x of each case of fixtures/compare.
+    /// Returns y, v and x of each case in fixtures/compare.
     fn cases() -> BTreeMap<&'static str, Vec<[f64; 3]>> {
         let mut all: BTreeMap<&str, Vec<[f64; 3]>> = BTreeMap::new();
         for line in include_str!("../../../../fixtures/compare/cases.csv").lines().skip(1) {
@@ -372,7 +373,8 @@ mod tests {
                 (_, "ci.ub") => of(k).interval.1,
                 _ => panic!("{name}"),
             };
-            // metafor stops its search at a step of 1e-12; there the likelihood is flat within 1e-8 of tau.
+            // metafor stops its search at a step of 1e-12; the likelihood is so flat there that tau is accurate to only
+            // about 1e-8.
             let tolerance = 1e-7 * expected.abs().max(1e-2);
             assert!(
                 (value - expected).abs() < tolerance,
@@ -422,14 +424,14 @@ mod tests {
 
     #[test]
     fn penalised_weights_are_not_dominated_by_one_person() {
-        // l has its maximum at zero, where the second person has 25 times the weight of the others.
+        // l has its maximum at zero, where the second person has 20 to 25 times the weight of the others.
         let all = [(0.3, 0.25), (-0.2, 0.01), (-0.4, 0.25), (0.1, 0.2)];
         let all = all.map(|(value, variance)| Observation { value, variance });
         let [penalised, restricted] = [Weights::Penalised, Weights::Restricted].map(|w| meta_mean(&all, w).unwrap());
         assert_eq!((restricted.tau_squared_of_weights, penalised.tau_squared), (0.0, 0.0));
         assert!(penalised.tau_squared_of_weights > 0.01);
         assert!(penalised.coefficients[0].standard_error > restricted.coefficients[0].standard_error);
-        // One or two degrees of freedom: equal weights.
+        // With one or two degrees of freedom, all weights are equal.
         for n in [2, 3] {
             let few = meta_mean(&all[..n], Weights::Penalised).unwrap();
             let mean = all[..n].iter().map(|o| o.value).sum::<f64>() / n as f64;

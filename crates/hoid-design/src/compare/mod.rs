@@ -6,7 +6,7 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`meta_regression`](fn@meta_regression) | regression of the estimates of people with their errors: restricted likelihood, intervals by Hartung and Knapp |
+//! | [`meta_regression`](fn@meta_regression) | regression of the estimates of people with their errors: restricted maximum likelihood (REML), Hartung-Knapp intervals |
 //! | [`EffectSize`] | d_z and Hedges' g, with intervals |
 //! | [`bayes_factor`] | evidence for a difference against no difference |
 //! | [`holm`] | adjustment of the p-values of several tests |

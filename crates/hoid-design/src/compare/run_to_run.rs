@@ -16,7 +16,7 @@ use super::{
     group_estimates::{Cell, distinct},
 };
 
-/// Smallest number of runs of a cell for its variation from run to run.
+/// Smallest number of runs from which the variation of a cell from run to run is computed.
 const MIN_RUNS: usize = 3;
 
 impl GroupEstimates {
@@ -53,8 +53,8 @@ mod tests {
 
     use super::{super::group_estimates::tests::group, *};
 
-    /// 40 cells of five runs with a variation of 15 %. The standard error of the standard deviation is `1/sqrt(2 160)`,
-    /// 5.6 %.
+    /// There are 40 cells of five runs with a variation of 15 %. The relative standard error of the estimated variation
+    /// is `1/sqrt(2 160)`, 5.6 %.
     #[test]
     fn run_to_run_variation_is_found() {
         let mut rng = ChaCha8Rng::seed_from_u64(5);

@@ -1,4 +1,5 @@
-//! The designed experiment: forcing function, expected errors for the typical person and for others, and its JSON.
+//! The designed experiment: the forcing function, the expected errors for the typical person and for others, and the
+//! JSON.
 
 use hoid_analysis::{AnalysisError, Setting, json};
 use hoid_model::{
@@ -26,7 +27,7 @@ pub struct NamedExpected {
 /// A designed experiment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ExperimentDesign {
-    /// The typical person, with controlled element and remnant.
+    /// The typical person, with the controlled element and the remnant.
     pub task: Task,
     /// Point of entry of the forcing function. If the display shows the target, a disturbance is added.
     pub enters: EntryPoint,

@@ -132,7 +132,7 @@ const PERSON_COST_RUNS: usize = 4;
 
 impl DifferenceRequest {
     /// Plans the numbers of people and runs; `of_run` contains the expected errors of one run, to which the relative
-    /// variation from run to run adds.
+    /// variation from run to run is added.
     ///
     /// # Errors
     /// [`DesignError::OutOfRange`] for an option out of range, [`DesignError::NotThere`] for an unknown quantity.
@@ -334,7 +334,7 @@ mod tests {
             relative.recommended_row().unwrap().people
         );
         assert!((relative.between_people - 0.1 * value).abs() < 1e-12);
-        // Of the margin, the variation of the gain: some degrees.
+        // The variation of the phase margin follows from that of the gain, and amounts to a few degrees.
         let margin = plan("margin=5", None).unwrap();
         assert!((0.6..13.0).contains(&margin.run_to_run), "{}", margin.run_to_run);
         assert_eq!(margin.between_source, "a default");
@@ -376,7 +376,7 @@ mod tests {
         let k = people_needed(plan.size / row.of_person, 0.8, 0.05).unwrap();
         let predicted = power(plan.size / row.of_person, k, 0.05).unwrap();
         println!("{people} people: found in {rate:.3}, predicted {predicted:.3}");
-        // Of 4000 the standard error is .006.
+        // The standard error of the rate over 4000 experiments is .006.
         assert!((rate - predicted).abs() < 0.02, "{rate} {predicted}");
     }
 }

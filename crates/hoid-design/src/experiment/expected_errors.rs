@@ -19,15 +19,15 @@ pub struct ExpectedQuantity {
     pub unit: Name,
     /// Value of the quantity with the standard error of the operator in these runs.
     pub estimate: Estimate,
-    /// Size to which variation is relative: the value; for the phase margin its derivative with respect to the
+    /// Size to which the variation is relative: the value; for the phase margin its derivative with respect to the
     /// logarithm of the gain, and for the delay to a target, which may be zero, the delay to the error.
     pub size: f64,
     /// Standard error for the person, which includes the variation from run to run.
     pub standard_error_person: Option<f64>,
 }
 
-/// Returns true if errors of a quantity are given in its unit: a relative error of the phase margin (deg), or of the
-/// delay to a target, which may be zero (s), has no meaning.
+/// Returns true if the errors of a quantity are given in its unit: in deg for the phase margin, and in s for the delay
+/// to a target, which may be zero. Relative errors of these quantities have no meaning.
 pub fn has_absolute_error(name: &str) -> bool {
     matches!(name, "phase_margin" | "tau_f")
 }
@@ -44,7 +44,7 @@ pub struct Expected {
 }
 
 impl Expected {
-    /// Returns a copy with the relative variation of one person between these runs in the errors for the person.
+    /// Returns a copy whose errors for the person include the relative variation of one person between these runs.
     #[must_use]
     pub fn with_run_to_run(mut self, variation: f64, runs: usize) -> Self {
         let of_mean = variation / (runs as f64).sqrt();
@@ -76,8 +76,8 @@ impl Expected {
         Some(self.quantity(name)?.estimate)
     }
 
-    /// Returns the standard error of a quantity for the person as accepted errors are given: relative to its value, or
-    /// in its unit if [`has_absolute_error`] is true.
+    /// Returns the standard error of a quantity for the person, in the form in which accepted errors are given:
+    /// relative to its value, or in its unit if [`has_absolute_error`] is true.
     pub fn error(&self, name: &str) -> Option<f64> {
         let found = self.quantity(name)?;
         let error = found.standard_error_person?;
@@ -87,7 +87,7 @@ impl Expected {
         })
     }
 
-    /// Returns the parameters of the person, without crossover and margin.
+    /// Returns the parameters of the person, without the crossover frequency and the phase margin.
     pub fn parameters(&self) -> impl Iterator<Item = &ExpectedQuantity> {
         let is_parameter = |q: &&ExpectedQuantity| !matches!(q.name, "crossover" | "phase_margin");
         self.quantities.iter().filter(is_parameter)
@@ -123,7 +123,7 @@ mod tests {
         }
         let relative = one.quantity("tau_e").unwrap().standard_error_person.unwrap() / 0.25;
         assert!((one.error("tau_e").unwrap() - relative).abs() < 1e-12 && relative > 0.1);
-        // Of the margin, the variation of the gain: some degrees.
+        // The size of the phase margin is its derivative with respect to the logarithm of the gain, some degrees.
         let margin = one.quantity("phase_margin").unwrap();
         assert!((3.0..100.0).contains(&margin.size), "{margin:?}");
         assert_eq!(one.error("phase_margin"), margin.standard_error_person);

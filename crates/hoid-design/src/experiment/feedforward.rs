@@ -1,4 +1,4 @@
-//! The typical response of people to a displayed target ([`typical_feedforward`]), required of a design.
+//! The typical response of people to a displayed target ([`typical_feedforward`]), which a design requires.
 
 use hoid_model::{
     FamilyState, Feedforward,

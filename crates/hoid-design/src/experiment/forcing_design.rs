@@ -2,11 +2,11 @@
 //!
 //! If the remnant is a share of the variance of u, the errors depend on how the power of u is distributed over the
 //! lines, and not on its size (`information`). With the shares q of the lines in the response of u to the forcing
-//! function, the information is `I = sum q_k M_k`. The requested quantities are parameters, crossover or margin, with
-//! gradients g and accepted errors s. The design minimises `J = sum over wanted g' I^-1 g/s^2`, the sum of the squared
-//! ratios of expected to accepted errors.
+//! function, the information is `I = sum q_k M_k`. The requested quantities are parameters, the crossover or the
+//! margin, with gradients g and accepted errors s. The design minimises `J = sum over wanted g' I^-1 g/s^2`, the sum of
+//! the squared ratios of expected to accepted errors.
 //!
-//! Amplitudes and frequencies are searched, within their limits, in the module `search`.
+//! The module `search` optimises the amplitudes and frequencies within their limits.
 
 use std::f64::consts::TAU;
 
@@ -224,7 +224,7 @@ mod tests {
             designed,
             DesignOptions::default().run(&task, &[EntryPoint::Target]).unwrap()
         );
-        // The shelf above the crossover, and no dominant line.
+        // The lines above the crossover frequency form the shelf, and no line dominates.
         let crossover = designed.expected.estimate("crossover").unwrap().value;
         let amplitudes = |beyond: bool| -> Vec<f64> {
             let all = designed.forcing.sinusoids(EntryPoint::Target).into_iter();

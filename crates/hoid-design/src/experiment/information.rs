@@ -12,7 +12,7 @@
 //! whose inverse is the smallest covariance that an unbiased estimate can have (H. Cramér, *Mathematical Methods of
 //! Statistics*, 1946, section 32.6). The part of the loop signals that the remnant itself excites is not included,
 //! because a free noise model uses up this information (U. Forssell and L. Ljung, *Automatica* 35 (1999) 1215-1241,
-//! section 5). The errors of functions of theta, such as crossover and margin, are computed to first order.
+//! section 5). The errors of functions of theta, such as the crossover and the margin, are computed to first order.
 //!
 //! The lines have to exceed the remnant in e. At a line that does not, the estimate of B is biased towards -1/P, and
 //! the predicted error is too small.
@@ -199,7 +199,7 @@ impl<'a> LoopQuantities<'a> {
         })
     }
 
-    /// Returns power and information of each line for unit amplitude, with the square of its amplitude.
+    /// Returns the power and information of each line for unit amplitude, with the square of its amplitude.
     fn lines(&self, forcing: &Forcing) -> Vec<(LineInformation, f64)> {
         let of = |(enters, line): &(EntryPoint, Sinusoid)| {
             (
@@ -251,7 +251,7 @@ impl<'a> LoopQuantities<'a> {
         all
     }
 
-    /// Returns crossover, margin and all parameters, of which one may be infinite.
+    /// Returns the crossover, the margin and all parameters, one of which may be infinite.
     fn all_quantities(&self) -> Vec<Quantity> {
         let parameters = self.joint.parameters(self.task);
         self.margins().into_iter().chain(parameters).collect()
@@ -277,8 +277,8 @@ impl<'a> LoopQuantities<'a> {
         ]
     }
 
-    /// Returns crossover and margin with their gradients: with `L = B P`, `d ln|L|/d omega domega = -Re dlnB` and
-    /// `dphi = Im dlnB + d arg L/d omega domega`.
+    /// Returns the crossover and the margin with their gradients: with `L = B P`, `d ln|L|/d omega domega = -Re dlnB`
+    /// and `dphi = Im dlnB + d arg L/d omega domega`.
     fn margin_gradients(&self, operator: &FamilyOperator) -> [(f64, DVector<f64>); 2] {
         let omega = self.crossover_rad_s;
         let response = operator.response_and_gradient(omega);
@@ -384,7 +384,7 @@ pub(super) mod tests {
         let error_of = |of: &Expected, name| error(&of.estimate(name).unwrap());
         assert!((error_of(&tenth, "crossover") / error_of(&one, "crossover") - 1.0).abs() < 1e-9);
         assert!((one.rms_e / tenth.rms_e - 10.0).abs() < 1e-9);
-        // p/(1 - p): .5 is four times .2, twice the error.
+        // For a share of .5, p/(1 - p) is four times that for a share of .2, so the error is twice as large.
         let louder = of(&task(0.5), 81.92);
         assert!((error_of(&louder, "phase_margin") / error_of(&one, "phase_margin") - 2.0).abs() < 1e-9);
     }

@@ -33,8 +33,8 @@ pub(super) struct Quantity {
     pub gradient: DVector<f64>,
     /// Unit of the accepted error: the value of the quantity, or one.
     pub scale: f64,
-    /// Size to which variation is relative, and the error if all parameters have the same weight: the value; for the
-    /// phase margin its derivative with respect to the logarithm of the gain.
+    /// Size to which the variation is relative, and the error if all parameters have the same weight: the value; for
+    /// the phase margin its derivative with respect to the logarithm of the gain.
     pub size: f64,
 }
 
@@ -167,7 +167,7 @@ mod tests {
         }
     }
 
-    /// The same task with one joint coordinate at another value.
+    /// Returns the task with one joint coordinate changed by `by`.
     fn with_moved_coordinate(task: &Task, joint: &JointCoordinates, index: usize, by: f64) -> Task {
         let change = |operator: &FamilyOperator, indices: &[usize]| {
             let x = operator.coordinates().iter().zip(indices);
@@ -186,7 +186,7 @@ mod tests {
     fn derivatives_agree_with_finite_differences() {
         let task = task();
         let joint = JointCoordinates::of(&task);
-        // K, omega_nm, zeta_nm, tau_e of B; K_d, T_L and the delay of F; one arm.
+        // K, omega_nm, zeta_nm and tau_e of B; K_d, T_L and the delay of F. Both share one neuromuscular system.
         assert_eq!(
             (joint.count, joint.target_coordinates.as_slice()),
             (7, &[4, 5, 1, 2, 6][..])
@@ -231,7 +231,7 @@ mod tests {
                 );
             }
         }
-        // With preview F anticipates; its error counts in s.
+        // With preview, F anticipates the target, and the error of its delay is absolute (in s).
         let tau = all.last().unwrap();
         assert!(tau.value < 0.0 && tau.scale == 1.0);
     }

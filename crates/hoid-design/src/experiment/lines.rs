@@ -186,7 +186,7 @@ mod tests {
         let mut other = equal_lines(&all, 80.0);
         set_phases(&mut other, 80.0, 7);
         assert!(lines != other && crest_factor(&other, 80.0) < 2.3);
-        // The table of one line has its amplitude.
+        // A single line has the crest factor of a sine.
         let one = equal_lines(&[3], 10.0);
         assert!((crest_factor(&one, 10.0) - 2f64.sqrt()).abs() < 1e-2);
     }

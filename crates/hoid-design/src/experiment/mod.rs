@@ -5,7 +5,7 @@
 //! | [`DesignRequest`] | a question about an experiment, and its answer, an [`ExperimentDesign`] with its JSON and its files (`files`) |
 //! | [`People`] | people for whom the experiment is designed: the population (`typical_operator`), one person, or a group (`group_people`) |
 //! | [`Task`], [`Forcing`] | person, controlled element and remnant; lines with their points of entry |
-//! | [`expected`](fn@expected) | standard errors from the information of the lines (`information`) and the variation from run to run, for the responses to error and target (`joint_coordinates`, `feedforward`) |
+//! | [`expected`](fn@expected) | standard errors from the information of the lines (`information`) and the variation from run to run, for the responses to the error and the target (`joint_coordinates`, `feedforward`) |
 //! | [`DesignOptions`] | most informative amplitudes and frequencies of the lines within limits (`search`) |
 //! | [`crest_factor`] | lines without common harmonics, and their phases (`lines`) |
 //! | [`OtherForcing`] | another forcing function for comparison |

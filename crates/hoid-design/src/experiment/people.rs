@@ -2,7 +2,7 @@
 //!
 //! | source | typical person | others |
 //! |---|---|---|
-//! | `population` | person predicted by the crossover model (`typical_operator`) | for each parameter of the prior, two people one spread above and below its median |
+//! | `population` | person predicted by the crossover model (`typical_operator`) | for each parameter of the prior, two people, one spread above and one spread below its median |
 //! | scenario, fit (including the response to a target) | the person of the file | none |
 //! | result of a group, `population.json` | medians over people (`group_people`) | each person |
 

@@ -86,7 +86,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    /// Of scipy and statsmodels; `make.py` next to the file made it.
+    /// Values computed with scipy and statsmodels by `make.py` in the same directory.
     const REFERENCE_TABLE: &str = include_str!("../../../../fixtures/power/power.csv");
 
     #[test]
@@ -116,7 +116,7 @@ mod tests {
             assert!(power(effect, people, 0.05).unwrap() >= wanted);
             assert!(power(effect, people - 1, 0.05).is_none_or(|found| found < wanted));
         }
-        // A table of paired tests: d_z = .5 takes 34 people, 1 takes 10.
+        // From a table for paired tests: d_z = .5 requires 34 people, and d_z = 1 requires 10.
         assert_eq!(people_needed(0.5, 0.8, 0.05), Some(34));
         assert_eq!(people_needed(1.0, 0.8, 0.05), Some(10));
         assert_eq!(people_needed(0.01, 0.8, 0.05), None);

@@ -348,7 +348,7 @@ mod tests {
         let worst = design.worst.unwrap();
         assert!(design.people.iter().all(|p| p.runs_needed <= worst.runs_needed));
         assert!(design.runs == design.runs_needed && worst.runs_needed > design.runs);
-        // With the accepted errors in so many runs.
+        // With this number of runs, the errors do not exceed the accepted errors.
         let error = |name: &str| design.expected.error(name).unwrap();
         assert!(error("tau_e") <= 0.03 && error("crossover") <= 0.01);
     }
@@ -390,7 +390,7 @@ mod tests {
             assert!(both.expected.estimate(name).unwrap().standard_error.unwrap() > 0.0);
         }
         assert_eq!(ExperimentDesign::from_json(&both.to_json()).unwrap(), both);
-        // The scenario that is written has the same person.
+        // The written scenario contains the same person.
         let name = "scenario.toml";
         let hoid_io::AnyScenario::Family(read) = hoid_io::parse_any_scenario(&both.scenario(), name, name).unwrap()
         else {

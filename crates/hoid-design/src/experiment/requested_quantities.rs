@@ -13,7 +13,8 @@ use super::{DesignError, Expected};
 pub struct RequestedQuantity {
     /// Name of the quantity: `crossover`, `phase_margin`, or a parameter.
     pub name: String,
-    /// Accepted standard error: in deg for the phase margin, relative to the value for other quantities.
+    /// Accepted standard error: in deg for the phase margin, in s for the delay to a target, and relative to the value
+    /// for other quantities.
     pub error: f64,
 }
 

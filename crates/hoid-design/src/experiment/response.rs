@@ -1,9 +1,9 @@
 //! Expected errors of the frequency response of a person: at the lines, and of the fitted operator between them.
 //!
 //! At a line the response is the ratio of the Fourier coefficients of u and e, with `var H^ = 4 S_n/(T a^2)`, where a
-//! is the amplitude of e (`information`). Half of this variance is along the response and half across it, so gain and
-//! phase each have the relative error `sqrt(2 S_n/(T a^2))/|H|`, times 8.7 dB and 57 deg. The operator has fewer
-//! parameters than the lines give numbers; its error, `dH/H = sum dH/dtheta_k dtheta_k/H` with the inverse of the
+//! is the amplitude of e (`information`). Half of this variance is along the response and half across it, so the gain
+//! and the phase each have the relative error `sqrt(2 S_n/(T a^2))/|H|`, times 8.7 dB and 57 deg. The operator has
+//! fewer parameters than the lines give numbers; its error, `dH/H = sum dH/dtheta_k dtheta_k/H` with the inverse of the
 //! information, is therefore smaller.
 //!
 //! In e, the power of a line exceeds that of the remnant by the factor `T a^2/(4 S_n |P S|^2)`.

@@ -9,7 +9,7 @@
 //!   V. Fedorov, *Theory of Optimal Experiments*, 1972), provided that no line is a harmonic of another.
 //! - **Two forcing functions.** If the target is displayed, a person responds to both the target and the error. Lines
 //!   of a target and of a disturbance, alternating in frequency, separate the two responses (`joint_coordinates`).
-//!   Their shares are searched together, and the limits apply to each forcing function.
+//!   Their shares are optimised together, and the limits apply to each forcing function.
 //! - **Limits.** If a target has much power above the crossover frequency, people lower their crossover frequency (D.
 //!   T. McRuer and H. R. Jex, *IEEE Trans. Human Factors in Electronics* 8 (1967) 231-249). The lines above it
 //!   therefore form a shelf: their amplitudes are at most a given fraction of the geometric mean of the amplitudes

@@ -12,8 +12,8 @@
 //! rho is one half or more. A population of one condition does not determine rho.
 //!
 //! The variation from run to run comes from a number, or from the crossover frequencies of the runs in the result of a
-//! group ([`GroupEstimates::run_to_run_variation`]), as an upper bound. It applies to all quantities: the prior of a
-//! fit reduces the scatter of other parameters.
+//! group ([`GroupEstimates::run_to_run_variation`]), as an upper bound. It is applied to all quantities, because the
+//! prior of a fit reduces the scatter of the other parameters.
 
 use std::{
     convert::Infallible,
@@ -33,7 +33,8 @@ use crate::compare::{Comparison, ComparisonOptions, GroupEstimates, Quantity, Va
 pub enum SpreadSource {
     /// A fraction of the quantity.
     Part(f64),
-    /// The result of a group; for a difference between people also a file with a comparison or a population.
+    /// The result of a group; for the spread of a difference over people, also a file with a comparison or a
+    /// population.
     File(PathBuf),
 }
 
@@ -72,7 +73,7 @@ pub(super) struct Spread {
 }
 
 /// Returns a given fraction of `unit`, or the value that `read` finds in the given file. If nothing is given, `read` is
-/// tried on the people of the design, and otherwise the result is the default fraction.
+/// tried on the people of the design; if this gives no value, the result is the default fraction.
 fn resolve_spread(
     given: Option<&SpreadSource>,
     people: &People,

@@ -1,9 +1,9 @@
-//! Errors that a design predicts against the scatter of simulated experiments.
+//! Compares the errors that a design predicts with the scatter of simulated experiments.
 //!
 //! Each experiment is the scenario that the design writes, simulated run by run. The responses are fitted to the
-//! Fourier coefficients at its lines, `U = B E + F X + N`, by Gauss-Newton with the weights `1/S_n`: the estimate of
-//! which the information of the lines is that of the least covariance. Of n experiments the standard deviation has an
-//! error of `1/sqrt(2 n)`.
+//! Fourier coefficients at its lines, `U = B E + F X + N`, by the Gauss-Newton method with the weights `1/S_n`. The
+//! covariance of this estimate is the inverse of the information of the lines. The relative standard error of a
+//! standard deviation over n experiments is `1/sqrt(2 n)`.
 
 use hoid_design::experiment::{DesignOptions, DesignRequest, EntryPoint, ExperimentDesign, Remnant};
 use hoid_io::{AnyScenario, parse_any_scenario};
@@ -15,11 +15,11 @@ use hoid_model::{
 use hoid_sim::{FamilySimulator, RunSeed};
 use nalgebra::{DMatrix, DVector};
 
-/// A question whose answer is checked.
+/// A design whose predicted errors are checked.
 pub struct Case {
     pub name: &'static str,
     pub element: &'static str,
-    /// That of the population if `None`.
+    /// Form of the operator; if `None`, that of the population.
     pub form: Option<Form>,
     pub enters: EntryPoint,
     pub display: Display,
@@ -30,7 +30,7 @@ pub struct Case {
     pub runs: usize,
 }
 
-/// A target on a display of the error, one run of 81.92 s.
+/// One run of 81.92 s with a target; the display shows only the error.
 const TARGET_CASE: Case = Case {
     name: "",
     element: "4/s",
@@ -133,7 +133,8 @@ pub const CASES: [Case; 12] = [
     },
 ];
 
-/// A quantity with its predicted error, and the standard deviation over the experiments divided by that.
+/// A quantity with its predicted error, and the ratio of the standard deviation over the experiments to the predicted
+/// error.
 pub struct CheckedQuantity {
     pub name: &'static str,
     pub value: f64,
@@ -141,7 +142,7 @@ pub struct CheckedQuantity {
     pub ratio: f64,
     /// Number of experiments with an estimate.
     pub experiments: usize,
-    /// Mean deviation from the truth in predicted errors.
+    /// Mean deviation from the true value, as a multiple of the predicted error.
     pub off: f64,
 }
 
@@ -183,7 +184,7 @@ impl Case {
         request.run().unwrap()
     }
 
-    /// Scatter of the estimates at the lines of so many experiments.
+    /// Returns the scatter of the estimates at the lines over the given number of experiments.
     pub fn check_errors(&self, experiments: u64, seed: u64) -> Vec<CheckedQuantity> {
         self.check_errors_with(experiments, seed, |truth, records, design, scenario| {
             let preview_s = scenario.feedforward.as_ref().map_or(0.0, |seen| seen.preview_s);
@@ -194,8 +195,8 @@ impl Case {
         })
     }
 
-    /// Scatter of the estimates that a method has of the runs of an experiment; those without a result or a
-    /// crossover are omitted.
+    /// Returns the scatter of the estimates that a method gives for the runs of each experiment; experiments without a
+    /// result or a crossover are omitted.
     pub fn check_errors_with(
         &self,
         experiments: u64,
@@ -251,7 +252,7 @@ impl Case {
     }
 }
 
-/// The scenario that the design writes.
+/// Returns the scenario that the design writes.
 pub fn scenario(design: &ExperimentDesign) -> FamilyScenario {
     let name = "scenario.toml";
     match parse_any_scenario(&design.scenario(), name, name).unwrap() {
@@ -285,7 +286,8 @@ fn coefficients(record: &Record, design: &ExperimentDesign, preview_s: f64) -> V
     design.lines.iter().map(|l| at(l.line.omega_rad_s)).collect()
 }
 
-/// Places of the coordinates of the response to the target: those of the arm are those of the response to the error.
+/// Positions of the coordinates of the response to the target, and the number of all coordinates. The neuromuscular
+/// coordinates are those of the response to the error.
 fn places(truth: &Responses) -> (Vec<usize>, usize) {
     let known = truth.feedback.form().coordinates(truth.feedback.has_neuromuscular());
     let mut count = known.len();
@@ -353,7 +355,7 @@ fn fit_lines(truth: &Responses, lines: &[Coefficients], time_constant_s: f64) ->
     found
 }
 
-/// A quantity by the name that it has in a design; `None` if the loop has no crossover.
+/// Returns the quantity with this name in a design; `None` if the loop has no crossover.
 fn quantity_value(found: &Responses, scenario: &FamilyScenario, name: &str) -> Option<f64> {
     let state = || FamilyState {
         operator: found.feedback.clone(),

@@ -30,7 +30,7 @@ pub(super) struct TrackerModel {
 }
 
 impl Model {
-    /// Builds the model from the parameters, for an experiment that starts at a time in s.
+    /// Builds the model from the parameters, for an experiment that starts at `start_s`.
     pub fn new(settings: &FmuSettings, given: &VariableValues<'_>, start_s: f64) -> FmiResult<Self> {
         Ok(match settings.kind()? {
             FmuKind::Tracker => Self::Tracker(Box::new(TrackerModel::new(settings, given)?)),
@@ -95,7 +95,7 @@ impl Model {
         matches!(self, Self::Tracker(_))
     }
 
-    /// Takes the sample at a time in s.
+    /// Takes the sample at the time `t_s`.
     pub fn take(&mut self, given: &VariableValues<'_>, t_s: f64) {
         match self {
             Self::Tracker(tracker) => tracker.take(given, t_s),

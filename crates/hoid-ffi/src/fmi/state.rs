@@ -134,7 +134,7 @@ unsafe fn handle_memory<'a>(place: *mut *mut State) -> FmiResult<&'a mut *mut St
 /// Passes a state to the importer: overwrites the existing state, or creates a new one if there is none.
 ///
 /// # Safety
-/// As for [`held`].
+/// As for [`handle_memory`].
 unsafe fn into_handle(bytes: Vec<u8>, place: *mut *mut State) -> FmiResult {
     // SAFETY: guaranteed by the caller of this function.
     let place = unsafe { handle_memory(place) }?;

@@ -1,4 +1,4 @@
-/* What stands behind an S-function outside of MATLAB: here a program that runs it on lines "e,u", as
+/* Code that runs an S-function outside of MATLAB: here a program that passes it lines "e,u", as
  * Simulink would. Arguments: method, sample time, options. */
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
-/* As much of Simulink's header as the example uses, written from its documentation: the test compiles
- * the S-function with it, and runs it as Simulink would. It is not Simulink. */
+/* Substitute for the part of Simulink's header that the example uses, written from its documentation: the test
+ * compiles the S-function with it, and runs it as Simulink would. It is not Simulink. */
 #ifndef SIMSTRUC_H
 #define SIMSTRUC_H
 

@@ -13,9 +13,9 @@
 //! A level of u, the constant that is not a response to e, also enters linearly and is eliminated together with the
 //! states. Any constant is the response of `1/F` to another constant plus a free response of `1/F`, so the column of
 //! the level is `-(D/C) (1/F) 1`, and w contains the level. With a pole close to one (an integration), `(1/F) 1` is a
-//! ramp: the response to a mean that was removed from e. In terms of a constant and of free responses this ramp would
-//! be a difference of numbers that are larger by the inverse of `1 - pole`, and `psi' psi` would lose all digits. The
-//! response to the level does not decay, so its basis vector is as long as the record.
+//! ramp: the response to a mean that was removed from e. If this ramp were expressed by a constant and free responses,
+//! it would be a difference of numbers that are larger by the factor `1/(1 - pole)`, and `psi' psi` would lose all
+//! digits. The response to the level does not decay, so its basis vector is as long as the record.
 
 use std::sync::Arc;
 

@@ -78,7 +78,7 @@ impl<'a> Criterion<'a> {
         let of_record = match self.initial {
             InitialState::Zero => return 0,
             InitialState::Estimate => of_inputs + self.orders.nc,
-            // The states of the noise model are not parameters but random numbers with a known variance.
+            // The states of the noise model are not parameters but random variables with a known covariance.
             InitialState::Backcast => of_inputs,
         };
         self.data.len() * of_record + self.data.iter().filter(|d| d.level).count()

@@ -12,7 +12,7 @@ use crate::{
     optimize::{Linearisation, Objective},
 };
 
-/// A closed-loop-like record with coloured noise and a start away from rest.
+/// Returns a record with coloured noise that does not start from rest.
 fn record(n: usize) -> (Vec<f64>, Vec<f64>) {
     let mut state = 12345_u64;
     let mut noise = || {
@@ -130,7 +130,8 @@ fn gradient_matches_finite_differences() {
                     shifted[i] += delta;
                     c.sum_of_squares(&shifted, &mut ws)
                 };
-                // Fourth-order difference: truncation error h^4, rounding error eps V/h = 1e-9 V.
+                // The fourth-order difference has a truncation error of order h^4 and a rounding error of 1e-9 V (eps
+                // V/h).
                 let slope = (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
                 let ours = -2.0 * exact.descent[i];
                 let scale = exact.gram[i * theta.len() + i].sqrt() * exact.sum_of_squares.sqrt();
@@ -158,7 +159,7 @@ fn residuals_satisfy_the_model_equation() {
     };
     let c = criterion(orders, vec![Data::new(&e, &u)], InitialState::Zero);
     let eps = c.residuals_of(&theta, 0, &mut Workspace::default());
-    // The recursions, sample by sample, with zeros before the record.
+    // The reference is computed by the recursions, sample by sample, with zeros before the record.
     let get = |x: &[f64], t: usize, lag: usize| if t >= lag { x[t - lag] } else { 0.0 };
     let (mut w, mut v, mut r) = (vec![], vec![], vec![]);
     for t in 0..u.len() {

@@ -215,13 +215,13 @@ mod tests {
         estimator.fit(records).unwrap().verdict(records, None).unwrap()
     }
 
-    /// The record with another output.
+    /// Returns the record with another output.
     fn with_output(record: &Record, output: Vec<f64>) -> Record {
         let input = Channel::new("e", "", record.input().to_vec());
         Record::new(record.sample_time(), input, Channel::new("u", "", output)).unwrap()
     }
 
-    /// White noise, nearly normal.
+    /// Returns white noise that is nearly normal.
     fn noise(n: usize) -> Vec<f64> {
         let mut state = 7_u64;
         let mut draw = || {
@@ -268,7 +268,7 @@ mod tests {
             let fit = Estimator::new(structure, orders).fit(records).unwrap();
             fit.verdict(records, None).unwrap()
         };
-        // Once as an operator, once as a model of other orders.
+        // The gains are determined neither in a model with the orders of an operator nor in a model of other orders.
         let arx = of(Structure::Arx, Structure::Arx.operator_orders(29));
         assert_eq!(arx.level, VerdictLevel::NotDetermined, "{arx}");
         let fir = of(
@@ -335,7 +335,7 @@ mod tests {
         );
         let found = of(-1.95, 1.01);
         assert!(found.iter().any(|f| f.kind == "unstable"), "{found:?}");
-        // Poles at 0.99 and 0.01, i.e. 1 and 460 rad/s: a damping ratio of 10.
+        // Poles at 0.99 and 0.01, i.e. 1 and 460 rad/s, have a damping ratio of 10.
         let found = of(-1.0, 0.0099);
         assert!(found.iter().any(|f| f.kind == "neuromuscular-lag"), "{found:?}");
     }

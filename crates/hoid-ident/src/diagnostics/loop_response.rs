@@ -1,6 +1,6 @@
 //! Test of whether the error e responds to the output u, as in a closed loop.
 //!
-//! In a closed loop every change of u affects e. The test asks whether the last [`TESTED_OUTPUTS_S`] of u improve the
+//! In a closed loop every change in u affects e. The test asks whether the last [`TESTED_OUTPUTS_S`] of u improve the
 //! prediction of e from earlier errors and outputs (C. W. J. Granger, *Econometrica* 37 (1969) 424-438). A component
 //! that is common to both signals, such as a forcing function, can be predicted from these earlier samples; the
 //! remaining part of u cannot.
@@ -16,9 +16,9 @@ const TESTED_OUTPUTS_S: f64 = 0.25;
 /// Result of the test of whether e responds to u.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoopResponse {
-    /// Probability that chance alone gives a share at least as large, if e does not respond to u.
+    /// Probability of a share at least as large if e does not respond to u.
     pub p_value: f64,
-    /// Share of the variance of e, as far as earlier samples do not explain it, that the latest outputs explain.
+    /// Share explained by the latest outputs, relative to the variance of e that earlier samples do not explain.
     pub share: f64,
 }
 

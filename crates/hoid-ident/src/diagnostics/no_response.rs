@@ -9,13 +9,14 @@
 //! `U_k = (A_u/A_e) N e^{-j omega tau} (b_1 + b_2 j omega + b_3/(j omega + a)) E_k + R_k`,
 //!
 //! where b is real. T is the share of the power of U that this regression explains, maximised over the delays
-//! [`DELAYS_S`] and the poles [`LAG_RATES`]. With one slow pole, the regression would leave much of the response of a
-//! person with a short lag, and with little remnant a few strong lines with random phases fit as well. Surrogate
-//! records have the same spectra, but random phases of E and therefore no relation between e and u (J. Theiler et al.,
-//! *Physica D* 58 (1992) 77-94). The values of T for [`SURROGATE_COUNT`] such records give the distribution of T if
-//! there is no response. If u does not depend on e, T is one more draw from this distribution: the probability that it
-//! exceeds all others is 1/([`SURROGATE_COUNT`] + 1), regardless of the spectra. Only the past of e is used, so a
-//! response of e to u does not count as a response of u. Several records have the same b.
+//! [`DELAYS_S`] and the poles [`LAG_RATES`]. With only one slow pole, the regression would leave much of the response
+//! of a person with a short lag unexplained. If there is also little remnant, a few strong lines with random phases
+//! would then fit equally well. Surrogate records have the same spectra, but random phases of E and therefore no
+//! relation between e and u (J. Theiler et al., *Physica D* 58 (1992) 77-94). The values of T for [`SURROGATE_COUNT`]
+//! such records give the distribution of T if there is no response. If u does not depend on e, T is one more draw from
+//! this distribution: the probability that it exceeds all others is 1/([`SURROGATE_COUNT`] + 1), regardless of the
+//! spectra. Only the past of e is used, so a response of e to u does not count as a response of u. Several records have
+//! the same b.
 
 use std::f64::consts::{PI, TAU};
 
@@ -289,7 +290,7 @@ mod tests {
     }
 
     /// Level of the test by Monte Carlo: for unrelated noise, slow and fast, 1 in 20 records has p < 0.05 (standard
-    /// error 0.011 for 400 records). Also tests e that responds to u.
+    /// error 0.011 for 400 records). The test also covers an e that responds to u.
     #[test]
     fn unrelated_channels_have_no_response() {
         let mut small = 0;

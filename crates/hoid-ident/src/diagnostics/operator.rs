@@ -30,7 +30,7 @@ pub fn has_negative_lead(o: &OperatorEstimate) -> bool {
 
 /// Returns findings about undetermined gains and leads, and about negative leads. Each operator has a label, such as
 /// ` of record 2`; the label of a single operator is empty. If K_e and K_e_dot of all operators are undetermined, the
-/// only finding is that there is too little response to e.
+/// only finding is that the response to e is too small.
 pub fn gain_findings(operators: &[(&str, OperatorEstimate)]) -> Vec<Finding> {
     let mut open = Vec::new();
     let mut all_open = !operators.is_empty();
@@ -204,7 +204,7 @@ mod tests {
             "{}",
             found[0].message
         );
-        // Both channels have reversed signs: the lead is correct.
+        // Both gains are negative, so T_L is positive and there is no negative lead.
         let flipped = OperatorEstimate {
             k_e: e(-0.09, 0.009),
             k_e_dot: e(-0.036, 0.004),

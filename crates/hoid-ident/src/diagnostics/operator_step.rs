@@ -36,7 +36,7 @@ const NOISE_ORDER: usize = 4;
 /// Number of parameters of the operator.
 const PARAMETER_COUNT: usize = 5;
 
-/// Change of one parameter of an operator that improves its fit to a record.
+/// Change in one parameter of an operator that improves its fit to a record.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OperatorStep {
     /// Name of the parameter.
@@ -184,7 +184,7 @@ mod tests {
 
     #[test]
     fn one_step_reaches_the_grey_box_fit() {
-        // Reference: a grey-box fit of the same stretch, whose noise model has order one instead of four.
+        // The reference is a grey-box fit of the same stretch, whose noise model has order one instead of four.
         let record = run(1);
         let start = OperatorParameters {
             k_e: 0.97 * truth().k_e,

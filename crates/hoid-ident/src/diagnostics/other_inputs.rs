@@ -9,9 +9,9 @@
 //!
 //! **Sticks with a dead zone.** If only the target excites the loop, the part of e that follows the target is larger
 //! than the rest of e. A dead zone has different gains for small and for large signals (the describing function of A.
-//! Gelb and W. E. Vander Velde, *Multiple-Input Describing Functions*, 1968), so u follows the target with another gain
-//! than e as a whole, which looks like a response to the target. If u [rests](StickRest) like the signal of such a stick,
-//! the finding is a note with both explanations.
+//! Gelb and W. E. Vander Velde, *Multiple-Input Describing Functions*, 1968), so the gain for the part of e that
+//! follows the target differs from the gain for the rest of e, which looks like a response to the target. If u
+//! [rests](StickRest) like the signal of such a stick, the finding is a note with both explanations.
 
 use std::f64::consts::TAU;
 

@@ -5,10 +5,9 @@
 //! [`NOISE_ORDER`] the test asks whether further taps Z on e explain part of eps. The taps are means of e over
 //! [`TAP_COUNT`] consecutive spans of [`TAP_S`]; they approximate an impulse response that X cannot represent. The test
 //! uses the Lagrange multiplier statistic (T. S. Breusch and A. R. Pagan, *Review of Economic Studies* 47 (1980)
-//! 239-253; L. Ljung,
-//! *System Identification*, 1999, section 16.6, for the residuals of a model)
+//! 239-253; L. Ljung, *System Identification*, 1999, section 16.6, for the residuals of a model)
 //!
-//! `s(t) = z(t) eps(t)`, where z is the remainder of D Z after the projection on D X and the lags of v,
+//! `s(t) = z(t) eps(t)`, where z is the remainder of D Z after projection onto D X and the lags of v,
 //!
 //! so that the effect of estimating b and D is removed: in a closed loop past e and past v are correlated. Two
 //! variances are used. The variance of the model gives `T = (sum s)' (sigma^2 sum z z')^-1 (sum s)`, chi-square with
@@ -175,7 +174,7 @@ mod tests {
         let (e, known, mut u) = simulate_loop(3, 0.0, |_| 1.0);
         let short = |n: usize| residual_response(&[known[..n].to_vec()], &e[..n], &u[..n], 100, TS);
         assert!(short(900).is_none() && short(1400).is_some());
-        // The same column twice, and a column of zeros.
+        // Columns that are linearly dependent, or a column of zeros, give no result.
         for columns in [vec![known.clone(), known.clone()], vec![vec![0.0; e.len()]]] {
             assert!(residual_response(&columns, &e, &u, 100, TS).is_none());
         }

@@ -10,7 +10,7 @@
 //! The limits are effect sizes, not significance levels: with the samples of ten runs a test rejects every model of a
 //! person, and the important question is how much the model leaves unexplained. In short records chance alone gives
 //! effects of this size. For them the limits are four standard errors `1/sqrt(n)` of a correlation of white noise, and
-//! a share of 20/n of the sum of squares, which one of n normal residuals exceeds with the probability 8e-6 n.
+//! a share of 20/n of the sum of squares, which one of n normal residuals exceeds with probability 8e-6 n.
 
 use hoid_model::{Finding, Record};
 
@@ -194,7 +194,7 @@ mod tests {
         let coloured: Vec<f64> = (1..3000).map(|t| eps[t] + 0.3 * eps[t - 1]).collect();
         let measures = ResidualMeasures::of(&[(&coloured, &e[1..])], 0.01);
         assert_eq!(finding_kinds(&measures), ["residuals-not-white"]);
-        // eps(t) + 0.3 eps(t-1): 0.3/1.09.
+        // The autocorrelation of eps(t) + 0.3 eps(t-1) at lag one is 0.3/1.09.
         assert!((measures.autocorrelation - 0.3 / 1.09).abs() < 0.05, "{measures:?}");
         let missed: Vec<f64> = (20..3000).map(|t| eps[t] + 0.3 * e[t - 20]).collect();
         let measures = ResidualMeasures::of(&[(&missed, &e[20..])], 0.01);

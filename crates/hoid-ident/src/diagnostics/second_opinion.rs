@@ -31,7 +31,7 @@ use crate::{
 const SLOW_PERIOD_FACTOR: f64 = 10.0;
 /// Two fits differ if an estimate differs by more than this number of standard errors.
 const SIGNIFICANT_DIFFERENCE: f64 = 3.0;
-/// Largest acceptable change of a parameter due to a level, in standard errors.
+/// Largest acceptable change in a parameter due to a level, in standard errors.
 const MAX_LEVEL_EFFECT: f64 = 2.0;
 
 /// Name of a quantity, and its estimates from the first and the second fit.
@@ -63,8 +63,8 @@ impl RemovedComponent {
             Self::Outliers => Finding::warning(
                 "leverage",
                 format!(
-                    "the fit depends on a few samples: limiting each sample by its neighbours changes {differ} \
-                     standard errors; inspect the recording"
+                    "the fit depends on a few samples: limiting the deviation of each sample from its neighbours \
+                     changes {differ} standard errors; inspect the recording"
                 ),
             ),
             Self::SlowComponents(period_s) => Finding::warning(

@@ -110,8 +110,8 @@ impl SigmoidFit {
 }
 
 /// Returns findings about parameters of family operators that do not differ from zero, and about implausible poles.
-/// Undetermined gains and leads are named; if no operator has a significant gain, the finding is that there is too
-/// little response to e.
+/// Undetermined gains and leads are named; if no operator has a significant gain, the finding is that the response to e
+/// is too small.
 fn family_findings(operators: &[(&str, &ChangedOperator)], sample_time: SampleTime) -> Vec<Finding> {
     let mut all = Vec::new();
     let mut open = Vec::new();
@@ -151,7 +151,7 @@ fn family_findings(operators: &[(&str, &ChangedOperator)], sample_time: SampleTi
             ),
         ));
     }
-    // The error of T_I is at least half of T_I, so 1/T_I does not differ significantly from zero.
+    // The standard error of T_I is more than half of T_I, so 1/T_I does not differ significantly from zero.
     if first.get("T_I").as_ref().is_some_and(is_undetermined) {
         all.push(Finding::note(
             "lag",

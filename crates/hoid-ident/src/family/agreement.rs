@@ -295,7 +295,7 @@ mod tests {
     #[test]
     fn estimate_covariance_matches_finite_differences() {
         let operator = |x: &[f64]| FamilyOperator::new(Form::LeadLag, true, x).unwrap();
-        // Three directions, including the gain.
+        // The covariance is a sum over three directions; the third is the gain alone.
         let directions = [
             [0.2, 0.05, 0.01, 0.1, 0.0, 0.004],
             [0.0, -0.08, 0.03, 0.0, 0.2, 0.01],
@@ -341,7 +341,7 @@ mod tests {
         for (statistic, expected) in statistics.iter().zip([1.0 / 1.02, 1.0 / 1.03, 0.0]) {
             assert!((statistic - expected).abs() < 1e-12, "{statistics:?}");
         }
-        // Three pairs.
+        // There are three pairs, so the smallest p-value is multiplied by three.
         let least = found.worst_pair().unwrap();
         assert!((found.p_value - (3.0 * least.p_value).min(1.0)).abs() < 1e-15);
         let without = agreement(&all, &sides, &[0.0; 36], |i| i == 0).unwrap();
@@ -350,8 +350,8 @@ mod tests {
 
     #[test]
     fn agreement_test_has_nominal_size() {
-        // Independent normal differences of three coordinates: a linear congruential generator (D. E. Knuth, MMIX) and
-        // sums of twelve deviates (central limit theorem).
+        // The differences of three coordinates are independent and nearly normal: sums of twelve deviates from a linear
+        // congruential generator (D. E. Knuth, MMIX).
         let mut state = 11_u64;
         let mut normal = || {
             let mut sum = -6.0;
@@ -376,7 +376,8 @@ mod tests {
             let found = agreement(&all, &sides, &[0.0; 36], |i| i < 3).unwrap();
             doubted += usize::from(found.p_value < 0.01);
         }
-        // Expected: 40 of 4000, with a standard error of 6.3; sums of twelve uniform deviates have thinner tails.
+        // The expected number is 40 of 4000, with a standard error of 6.3; sums of twelve uniform deviates have thinner
+        // tails.
         assert!((20..=60).contains(&doubted), "{doubted}");
     }
 }

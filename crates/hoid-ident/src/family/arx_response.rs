@@ -23,8 +23,8 @@ const MIN_COEFFICIENTS: usize = 4;
 pub(super) const MAX_NB: usize = 60;
 /// Innovation variance relative to the power of u below which the record may be free of noise.
 const LOW_NOISE_RATIO: f64 = 1e-3;
-/// Smallest ratio of the innovation variance to the power of rounding errors at which the residuals are noise. The margin
-/// allows for different degrees of freedom and first samples.
+/// Smallest ratio of the innovation variance to the power of rounding errors at which the residuals are noise. The
+/// margin allows for different degrees of freedom and first samples.
 const MIN_NOISE_TO_ROUNDING_RATIO: f64 = 4.0;
 /// Lowest and highest order of A in the exact ARX model of an operator: the neuromuscular system and up to two lags.
 const EXACT_NA_RANGE: (usize, usize) = (2, 4);
@@ -50,9 +50,9 @@ pub(super) struct ArxResponse {
 
 impl ArxResponse {
     /// Estimates the response from all records together. The orders are halved until the records determine the
-    /// coefficients; a smooth record determines fewer of them. The sampling frequency is halved while B would still
-    /// have [`MAX_NB`] coefficients, and if B became shorter than [`SHORTEST_RESPONSE_S`], down to the lowest
-    /// frequency that leaves the band of the response.
+    /// coefficients; a smooth record determines fewer of them. The sampling frequency is halved if B would need at
+    /// least twice [`MAX_NB`] coefficients or if B has become shorter than [`SHORTEST_RESPONSE_S`], as long as the pass
+    /// band still contains the band of the response.
     ///
     /// # Errors
     /// The errors of the regression with the lowest orders.
@@ -160,7 +160,7 @@ pub(super) fn halve_orders((na, nb): (usize, usize)) -> Option<(usize, usize)> {
     (na.max(nb) > MIN_COEFFICIENTS).then(|| (na.div_ceil(2).max(2), nb.div_ceil(2).max(2)))
 }
 
-/// Returns an ARX estimator that also estimates a level: without noise, an error of the removed means would be visible.
+/// Returns an ARX estimator that also estimates a level: without noise, an error in the removed means would be visible.
 fn estimator_with_level(orders: Orders) -> Estimator {
     Estimator {
         level: true,

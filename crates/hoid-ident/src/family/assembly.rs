@@ -231,9 +231,9 @@ impl<'a> ChosenForm<'_, 'a> {
         fit_with_lines(self.prediction, fit, (lines?, &data), workspace)
     }
 
-    /// Returns the evidence for the forms in which the gain K has the same meaning or the same value as in the best form.
-    /// A form with a pure integration has no such gain. It is evidence against the K of a form with a lag, which is then
-    /// infinite, but not against the K of a form without one.
+    /// Returns the evidence for the forms in which the gain K has the same meaning or the same value as in the best
+    /// form. A form with a pure integration has no such gain. It is evidence against the K of a form with a lag, which
+    /// is then infinite, but not against the K of a form without one.
     fn dc_gain_share(&self, forms: &[FormFigures], best: &WeighedForm) -> f64 {
         let has_lag = best.form.has_lag();
         let has_gain = |form: Form| has_lag || self.gains.iter().any(|(of, _)| *of == form);
@@ -346,8 +346,8 @@ impl<'a> ChosenForm<'_, 'a> {
 
 /// Adds the bias of the fit to its errors. With a fit at the lines, the bias is the difference between the two fits.
 /// For coordinates that the lines do not determine, and without lines, it is taken from the differences from fits with
-/// other noise models ([`super::sensitivity`]). `unseen` is false with little noise; the additional variances without
-/// lines then do not apply.
+/// other noise models ([`super::sensitivity`]). If `unseen` is false, as with little noise, the additional variances
+/// for fits without lines are omitted.
 fn add_bias(
     errors: &mut EstimateErrors,
     fit: &PredictionFit<'_>,
@@ -391,8 +391,8 @@ fn add_bias(
     covariances.widen(fit, &mut errors.profiles);
 }
 
-/// Compares all methods over the gain and the determined coordinates, as far as their prior shares at the lines and
-/// with instrumental variables are small; `None` if fewer than two methods have errors.
+/// Compares all methods over the gain and those determined coordinates whose prior shares are small both at the lines
+/// and with instrumental variables; `None` if fewer than two methods have errors.
 fn compare_methods(
     fit: &PredictionFit<'_>,
     operator: &EstimatedOperator,

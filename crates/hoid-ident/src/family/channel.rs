@@ -159,7 +159,8 @@ pub struct ChannelResponse {
 }
 
 impl ChannelFit {
-    /// Returns gain and phase of the response to the channel at frequencies in rad/s; `None` if there is no response.
+    /// Returns the gain and phase of the response to the channel at frequencies in rad/s; `None` if there is no
+    /// response.
     pub fn frequency_response(
         &self,
         omega_rad_s: &[f64],

@@ -4,8 +4,8 @@
 //!
 //! `chi^2 = sum 2 |mean u - sum_i Y_i(j omega) mean x_i|^2 / var` plus the prior,
 //!
-//! over the lines of [`ChannelLines`], which states means and variances. The gains enter linearly, so the search starts
-//! from their best values for a grid of the other coordinates.
+//! over the lines of [`ChannelLines`], where the means and variances are defined. The gains enter linearly, so the
+//! search starts from their best values for a grid of the other coordinates.
 
 use std::sync::Arc;
 

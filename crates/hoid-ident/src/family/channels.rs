@@ -51,7 +51,7 @@ use crate::{
     several_inputs::SeveralInputs,
 };
 
-/// Relative increase of the diagonal of the normal matrix in the regression for the ARX model.
+/// Relative increase in the diagonal of the normal matrix in the regression for the ARX model.
 const RELATIVE_RIDGE: f64 = 1e-7;
 /// Longest delay of a channel relative to the end of the preview, s.
 const LONGEST_DELAY_S: f64 = 0.8;
@@ -207,8 +207,8 @@ impl<'s> FurtherInputs<'s> {
     /// Returns the lines with their variances, starting from the responses of the ARX model.
     ///
     /// If the lines do not distinguish the inputs, the variances are those of a fit without the further inputs. With
-    /// them, `Y_e = -1/P` and `Y_r = 1/P` reproduce u without error, since `e = r - P u`. A fit near this solution leaves
-    /// next to nothing in the bins between the lines, so the variances would be far too small.
+    /// them, `Y_e = -1/P` and `Y_r = 1/P` reproduce u without error, since `e = r - P u`. A fit near this solution
+    /// leaves next to nothing in the bins between the lines, so the variances would be far too small.
     pub fn weighted_lines(
         &self,
         at: &ChannelLineFitter<'_>,
@@ -260,7 +260,7 @@ impl<'s> FurtherInputs<'s> {
             nk: 1,
             ..hoid_model::Orders::default()
         };
-        // Relative to the end of the preview, the delay is longer by the preview.
+        // The delay relative to the end of the preview is longer by the preview time.
         let own = |lead: &usize| InputOrders {
             nb: (nb + lead).min(2 * MAX_NB),
             nf: 0,
@@ -295,7 +295,7 @@ impl<'s> FurtherInputs<'s> {
         if criterion.residual_count() <= 2 * criterion.parameter_count() {
             return None;
         }
-        // An input with few lines determines only the response at these lines, and thus only few combinations of the
+        // An input with few lines determines only the response at these lines, and thus only a few combinations of the
         // coefficients; the ridge makes the regression regular.
         let fit = model.fit_ridge(&criterion, RELATIVE_RIDGE, sample_time)?;
         let omega = frequencies(sample_time);

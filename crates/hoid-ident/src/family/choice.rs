@@ -21,7 +21,7 @@ pub struct FormFigures {
     pub criterion: Option<f64>,
     /// Weight in averages over forms; zero for a form that the data reject or do not determine.
     pub weight: f64,
-    /// chi^2 at the lines of each held-out run for the fit to the other runs, summed over all runs.
+    /// chi^2 of each held-out run at the lines, computed with the fit to the other runs and summed over all runs.
     pub held_out: Option<f64>,
     /// chi^2 of the fit at the lines.
     pub chi_squared: Option<f64>,
@@ -67,8 +67,8 @@ pub(super) fn weights(criteria: &[Option<f64>], best: usize) -> Vec<f64> {
     weights.iter().map(|w| w / total).collect()
 }
 
-/// Returns the Akaike weight of the forms that satisfy a condition, among all forms with a criterion. Unlike the weight in
-/// averages, it includes forms that the data do not reject but whose parameters they do not determine.
+/// Returns the Akaike weight of the forms that satisfy a condition, among all forms with a criterion. Unlike the weight
+/// in averages, it includes forms that the data do not reject but whose parameters they do not determine.
 pub(super) fn evidence_for<'f>(
     figures: impl Iterator<Item = &'f FormFigures> + Clone,
     is_meant: impl Fn(Form) -> bool,

@@ -77,7 +77,7 @@ impl Clusters {
             let psi = of_theta.jacobian(&mapped.theta, 0, workspace);
             let positions = criterion.layout.positions(record);
             let n = residuals.len();
-            // Blocks longer than the memory of loop and noise have nearly independent scores.
+            // Blocks longer than the memory of the loop and of the noise have nearly independent scores.
             let wanted = match kind {
                 ClusterKind::Runs => 1,
                 ClusterKind::Blocks => BLOCK_COUNT.div_ceil(records).min(n / shortest.max(1)).max(1),

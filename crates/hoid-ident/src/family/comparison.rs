@@ -117,8 +117,8 @@ fn exclude_equivalent_form(counting: &mut [Option<f64>], tried: &[TriedForm<'_>]
     }
 }
 
-/// Keeps only the forms that fit equally well. Without noise, a wrong form has a residual many times larger than the
-/// right form, whichever parameters it determines. Sums of squares below `equal` count as equal.
+/// Keeps only the forms that fit equally well. Without noise, the residual of a wrong form is many times larger than
+/// that of the right form, whichever parameters it determines. Sums of squares below `equal` count as equal.
 fn keep_best_fits(counting: &mut [Option<f64>], tried: &[TriedForm<'_>], equal: f64) {
     let squares = |i: usize| {
         let fit = tried[i].fit.as_ref().ok();
@@ -186,13 +186,13 @@ fn comparison_is_biased(tried: &[TriedForm<'_>], prediction: &PredictionProblem<
     tried.len() > 1 && prediction.little_noise.is_none() && tried.iter().all(|t| t.lines.is_none())
 }
 
-/// Returns the ratio of the mean squared error of the response, which includes the bias by the noise model, to its
+/// Returns the ratio of the mean squared error of the response, which includes the bias due to the noise model, to its
 /// variance, averaged over the band of manual control.
 ///
-/// In a closed loop without lines, an error of the noise model biases the estimate ([`super::sensitivity`]), and a
-/// wrong form may fit better than the right one because it compensates for that error. The likelihood ratio of two
-/// forms is a squared distance in units of the errors; if the bias enlarges the errors, this ratio decreases
-/// accordingly.
+/// In a closed loop without lines, an error in the noise model biases the estimate ([`super::sensitivity`]), and a
+/// wrong form may fit better than the right one because it compensates for that error. The logarithm of the likelihood
+/// ratio of two forms is proportional to a squared distance in units of the errors; if the bias enlarges the errors,
+/// this logarithm decreases accordingly.
 fn evidence_bias_ratio(
     best: &TriedForm<'_>,
     prediction: &PredictionProblem<'_>,

@@ -100,8 +100,9 @@ impl Covariances {
         }
     }
 
-    /// Widens the intervals by profile likelihood, which allow only for kappa. If the variance of an element is larger,
-    /// the distances of the interval ends from the estimate are multiplied by the ratio of the standard errors.
+    /// Widens the profile likelihood intervals, which account only for the inflation kappa. If the variance of an
+    /// element exceeds the inflated model-based variance, the distances of the interval ends from the estimate are
+    /// multiplied by the ratio of the two standard errors.
     pub fn widen(&self, fit: &PredictionFit<'_>, profiles: &mut [Option<(f64, f64)>]) {
         let p = fit.parameter_count();
         for (i, profile) in profiles.iter_mut().enumerate() {
@@ -138,9 +139,9 @@ fn differences(fit: &PredictionFit<'_>, other: &[f64]) -> Vec<(usize, f64)> {
         .collect()
 }
 
-/// Largest ratio of `J d` to the difference of two responses at which d is not replaced.
+/// Largest ratio of `J d` to the difference of two responses for which d is not replaced.
 const MAX_LINEARISATION_RATIO: f64 = 2.0;
-/// Relative increase of the diagonal of `J' J`, which makes it regular.
+/// Relative increase in the diagonal of `J' J`, which makes it regular.
 const RELATIVE_RIDGE: f64 = 1e-9;
 
 /// Returns the least squares solution of `J d = H - H_other`, relative to |H|, over the band of manual control and an

@@ -1,18 +1,18 @@
 //! Smooth deviation of a person's response from the fitted form.
 //!
-//! A form describes a person only approximately: a dead zone, pulses or a slow adaptation have no place in it. If the
+//! A form describes a person only approximately: it does not represent a dead zone, pulses or slow adaptation. If the
 //! lines of the excitation are known better than the form fits them, chi^2 exceeds its degrees of freedom, and the
 //! standard errors, which assume the form, are too small. The sampled response is therefore
 //!
 //! `H(omega) = Y(omega) Z(omega) (1 + delta(omega))`
 //!
-//! where real and imaginary part of delta are independent Gaussian processes of `ln omega` with variance s^2 and
+//! where the real and imaginary parts of delta are independent Gaussian processes of `ln omega` with variance s^2 and
 //! correlation `R = (1 + a) e^{-a}`, `a = sqrt(3) |ln(omega/omega')|/L`; L is an octave (M. C. Kennedy and A. O'Hagan,
-//! *J. Royal Statistical Society B* 63 (2001) 425-464). This is the smoothest Matern process that has a slope and no
-//! curvature: the crossover error needs the slope of the response.
+//! *J. Royal Statistical Society B* 63 (2001) 425-464). This Matern process is differentiable once but not twice; the
+//! slope is needed for the error of the crossover.
 //!
 //! **Variance.** Let `H_j` be the lines with variance v_j and `N = diag(v_j/(2 |Y_j Z_j|^2))`, G the slopes
-//! `d ln Y_j/dx`, and C the covariance of the fit at the lines. Then, with the sum over real and imaginary part,
+//! `d ln Y_j/dx`, and C the covariance of the fit at the lines. Then, with the sum over the real and imaginary parts,
 //!
 //! `E chi^2 = nu + s^2 (tr N^-1 R - tr C M)`,  `M = sum G' N^-1 R N^-1 G`
 //!
@@ -23,9 +23,9 @@
 //!
 //! `delta = k' (s^2 R + N)^-1 d`,  `var delta = s^2 - k' (s^2 R + N)^-1 k`
 //!
-//! in each part: at a well known line the response is that of the line, and far from all lines that of the form, with
-//! the variance s^2 in addition. The same deviation shifts the coordinates of the form by `C G' N^-1 delta`. This
-//! variance, `s^2 C M C`, is added to the errors of the parameters.
+//! in each part: at a line that is accurately known the response is that of the line; far from all lines it is that of
+//! the form, with an additional variance s^2. The same deviation shifts the coordinates of the form by
+//! `C G' N^-1 delta`. This variance, `s^2 C M C`, is added to the errors of the parameters.
 
 use hoid_model::{Complex64, FamilyOperator, SampleTime};
 use nalgebra::{DMatrix, DVector};
@@ -49,7 +49,7 @@ pub struct Misfit {
 pub struct ResponseDeviation {
     variance: f64,
     ln_omega: Vec<f64>,
-    /// Real and imaginary part of `(s^2 R + N)^-1 d`.
+    /// Real and imaginary parts of `(s^2 R + N)^-1 d`.
     weights: Vec<[f64; 2]>,
     /// `(s^2 R + N)^-1` by rows.
     precision: Vec<f64>,
@@ -71,7 +71,7 @@ fn ln_frequencies(points: &[MeasuredResponse]) -> Vec<f64> {
     points.iter().map(|point| point.omega_rad_s.ln()).collect()
 }
 
-/// Returns the variance of real and imaginary part of each line relative to a response.
+/// Returns the variance of the real and of the imaginary part of a line, relative to a response.
 fn relative_variance(point: &MeasuredResponse, sampled: Complex64) -> f64 {
     point.variance / (2.0 * sampled.norm_sqr())
 }
@@ -224,7 +224,7 @@ mod tests {
 
     #[test]
     fn deviation_of_a_known_size_is_found_and_covered() {
-        // Slow wave in ln omega of 20 % in gain and phase.
+        // The deviation is a slow wave in ln omega with an amplitude of 20 %.
         let wave = |omega: f64| Complex64::from_polar(0.2, 2.2 * omega.ln());
         let (mut variances, mut squares, mut plain) = (0.0, 0.0, 0.0);
         let people = 40;
@@ -243,9 +243,10 @@ mod tests {
                 plain += (ratio - 1.0).norm_sqr() / (ERROR * ERROR * n);
             }
         }
-        // Variance 0.02 in each part, of which the form takes up some.
+        // The variance is 0.02 in each part; the form absorbs some of it.
         assert!((0.008..0.04).contains(&variances), "{variances}");
-        // In standard errors: the form alone is far off, its deviation is covered.
+        // These are mean squares in units of the variances: the form alone is far off, and with its deviation the
+        // errors are covered.
         assert!(plain > 4.0 && (0.3..1.3).contains(&squares), "{plain} {squares}");
     }
 

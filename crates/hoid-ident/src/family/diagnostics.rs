@@ -392,8 +392,8 @@ fn add_method_findings(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
         all.push(Finding::warning(
             "form-refuted",
             format!(
-                "a Box-Jenkins model of the same orders has a {:.1} % smaller loss (likelihood ratio {:.0} with {} \
-                 degrees of freedom): the form is rejected",
+                "the loss is {:.1} % larger than that of a Box-Jenkins model of the same orders (likelihood-ratio \
+                 statistic {:.0} with {} degrees of freedom): the form is rejected",
                 100.0 * (judged.loss / free.loss - 1.0),
                 free.likelihood_ratio,
                 free.degrees_of_freedom

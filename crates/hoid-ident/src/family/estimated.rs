@@ -67,12 +67,13 @@ impl EstimateErrors {
     }
 }
 
-/// Returns the interval of the delay if the interval of the lead reaches its lower bound, zero; `None` otherwise, or for
-/// other elements.
+/// Returns the interval of the delay if the interval of the lead reaches its lower bound, zero; `None` otherwise, or
+/// for other elements.
 ///
 /// Near `T_L = 0` a lead and a delay change the response in the same way, so the information matrix determines only
-/// `tau_e - k T_L`, with k = 1 for one lead. The interval of T_L from the profile likelihood therefore extends the interval
-/// of tau_e by `k T_L`. With T_L fixed, the delay has the conditional variance `c_tt - c_tL^2/c_LL`, and `k = c_tL/c_LL`.
+/// `tau_e - k T_L`, with k = 1 for one lead. The interval of T_L from the profile likelihood therefore extends the
+/// interval of tau_e by `k T_L`. With T_L fixed, the delay has the conditional variance `c_tt - c_tL^2/c_LL`, and
+/// `k = c_tL/c_LL`.
 fn delay_interval(
     fit: &PredictionFit<'_>,
     errors: &EstimateErrors,
@@ -183,7 +184,8 @@ impl EstimatedOperator {
     }
 }
 
-/// Returns the curvature of the prior of an element of eta, relative to the innovation variance; `None` without a prior.
+/// Returns the curvature of the prior of an element of eta, relative to the innovation variance; `None` without a
+/// prior.
 fn prior_precision(fit: &PredictionFit<'_>, place: usize) -> Option<f64> {
     let penalty = fit.criterion.penalty.iter().find(|p| p.index == place)?;
     Some(penalty.curvature(fit.eta()) / fit.innovation_variance)
@@ -266,10 +268,10 @@ pub(super) fn record_operator(
     })
 }
 
-/// Returns the average of a parameter over the forms in which it has the same meaning: K of a form with a lag is
-/// the gain at zero frequency, far below the band, and K (in the form lead `K_e`) of another form is the gain in the band. K is not determined if
-/// forms with the other meaning are likely; `dc_gain_share` is the evidence for the forms with the meaning of the best
-/// form.
+/// Returns the average of a parameter over the forms in which it has the same meaning. In a form with a lag, K is the
+/// gain at zero frequency, far below the band; in other forms K (`K_e` in the form with one lead) is the gain in the
+/// band. K is not determined if forms with the other meaning are likely; `dc_gain_share` is the evidence for the forms
+/// in which it has the same meaning as in the best form.
 fn averaged_parameter(
     own: &Parameter,
     (weighed, dc_gain_share): (&[WeighedForm], f64),

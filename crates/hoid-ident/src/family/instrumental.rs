@@ -27,8 +27,8 @@
 //!
 //! **Errors.** To first order, x minus the true value is `A^-1 Z' eps` with `A = Z' Psi + P`. The covariance is
 //! `kappa sigma^2 A^-1 Z'Z A^-T` with kappa from the prediction error fit, plus the contribution of the prior. If most
-//! of e is the person's own remnant, the instruments are weak and the first order is inaccurate: among virtual people,
-//! one in 24 had a gain and a lead with errors of five standard errors.
+//! of e is the person's own remnant, the instruments are weak and the first-order covariance is inaccurate: for one in
+//! 24 virtual people, the errors of the gain and of the lead were five standard errors.
 
 use std::ops::Range;
 
@@ -71,7 +71,7 @@ pub struct InstrumentalFit {
 }
 
 impl InstrumentalFit {
-    /// Returns names, values and first-order standard errors of the parameters.
+    /// Returns the names, values and first-order standard errors of the parameters.
     pub fn parameters(&self) -> Vec<(&'static str, Estimate)> {
         let all = self.operator.named_estimates(self.covariance.as_deref());
         all.into_iter()
@@ -106,6 +106,8 @@ pub(super) struct InstrumentalSearch<'p, 'a> {
 }
 
 impl<'p, 'a> InstrumentalSearch<'p, 'a> {
+    /// Creates the search for a fit, with the part of e that follows the channel `excitation` as noise-free input.
+    ///
     /// # Errors
     /// The errors of [`noise_free_inputs`]: the channel is missing, constant, or a signal of the loop.
     pub fn new(
@@ -440,7 +442,8 @@ mod tests {
     #[test]
     fn true_parameters_lie_within_their_errors() {
         // Medians are used because the first of these people has weak instruments (see above). The median of twelve
-        // values of chi^2 has a standard error of 0.32: 1/(2 f sqrt(12)), with the density f = 0.45 at the median.
+        // values of chi^2 has a standard error of about 0.31: 1/(2 f sqrt(12)), with the density f = 0.47 at the
+        // median.
         let mut squares = [Vec::new(), Vec::new()];
         for number in 0..12 {
             let (person, records) = person(number);
@@ -462,7 +465,8 @@ mod tests {
 
     #[test]
     fn psi_as_instruments_gives_the_prediction_error_minimum() {
-        // Z' eps + P (m - x) is then the descent of the loss, for the D of that fit.
+        // With Psi as instruments, Z' eps + P (m - x) is the descent of the loss, for the D of the prediction error
+        // fit.
         let (_, records) = person(3);
         let estimator = estimator();
         let records: Vec<Record> = records.iter().map(|r| r.clone().detrended(estimator.detrend)).collect();

@@ -1,6 +1,6 @@
 //! The prediction error fit with the lines of the excitation as additional measurements of the response.
 //!
-//! In a closed loop an error of the noise model biases the prediction error fit; the fit at the lines has no such bias,
+//! In a closed loop an error in the noise model biases the prediction error fit; the fit at the lines has no such bias,
 //! but larger errors. Let H_P and H_L be the responses of the two fits, and V_P and V_L the relative variances of these
 //! responses. Without bias the difference `d = (H_L - H_P)/H_P` has the variance `V_L - V_P`, because an efficient
 //! estimate is uncorrelated with d (J. A. Hausman, *Econometrica* 46 (1978) 1251-1271). If d also contains a bias of
@@ -174,7 +174,7 @@ mod tests {
     #[test]
     fn lines_reduce_the_bias_of_a_wrong_noise_model() {
         let truth = FamilyOperator::new(Form::Lead, true, &TRUTH).unwrap();
-        // If the remnant is modelled as white, the fit in the loop is biased.
+        // If the remnant is modelled as white (nd = 0), the prediction error fit in the closed loop is biased.
         let fitted = |excitation: Option<&str>, nd: usize| {
             let estimator = FamilyEstimator {
                 forms: vec![Form::Lead],

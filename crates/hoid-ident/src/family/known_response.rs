@@ -4,13 +4,13 @@ use hoid_model::{Complex64, FamilyOperator, SampleTime, uncertainty::Estimate};
 
 use super::{deviation::ResponseDeviation, intersample::Intersample};
 
-/// An operator at one frequency: its sampled response, and the covariance of the real and imaginary part of its
+/// An operator at one frequency: its sampled response, and the covariance of the real and imaginary parts of its
 /// relative error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct KnownResponse {
     /// Sampled response Y.
     pub value: Complex64,
-    /// Covariance of the real and imaginary part of `dY/Y`; `None` if unknown.
+    /// Covariance of the real and imaginary parts of `dY/Y`; `None` if unknown.
     pub relative: Option<[[f64; 2]; 2]>,
 }
 
@@ -39,7 +39,7 @@ impl KnownResponse {
         Self { value, relative }
     }
 
-    /// Returns an estimate that changes by these amounts for the real and imaginary part of `dY/Y`.
+    /// Returns an estimate that changes by these amounts per unit of the real and imaginary parts of `dY/Y`.
     pub(super) fn estimate(&self, value: f64, [a, b]: [f64; 2]) -> Estimate {
         match self.relative {
             Some(c) => Estimate::with_variance(value, a * a * c[0][0] + 2.0 * a * b * c[0][1] + b * b * c[1][1]),

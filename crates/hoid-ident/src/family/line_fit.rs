@@ -91,7 +91,8 @@ impl LineFit {
         [self.operator.coordinates(), &self.of_channels].concat()
     }
 
-    /// Returns names, values and first-order standard errors of the parameters; infinite values have no standard error.
+    /// Returns the names, values and first-order standard errors of the parameters; infinite values have no standard
+    /// error.
     pub fn parameters(&self) -> Vec<(&'static str, Estimate)> {
         let all = self.operator.named_estimates(self.covariance.as_deref());
         all.into_iter()

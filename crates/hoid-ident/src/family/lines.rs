@@ -4,8 +4,8 @@
 //! small n the smallest of these variances would dominate the fit. The relative variances `r_j = v_j/|H_j|^2` are
 //! therefore shrunk towards the relative variance b_j of the remnant near the line, which is computed from many bins:
 //! `r_j <- (nu r_j + nu_0 c b_j)/(nu + nu_0)` with `nu = 2(n - 1)`. The factor c is the median of `r_j/b_j`, at least
-//! one, and represents differences between runs in excess of the remnant (shrunk_variance variances; G. K. Smyth,
-//! *Statistical Applications in Genetics and Molecular Biology* 3 (2004), article 3).
+//! one, and represents differences between runs in excess of the remnant (shrunk variances; G. K. Smyth, *Statistical
+//! Applications in Genetics and Molecular Biology* 3 (2004), article 3).
 
 use hoid_model::Complex64;
 use hoid_numerics::statistics::upper_median;

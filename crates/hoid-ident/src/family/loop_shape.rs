@@ -2,14 +2,15 @@
 //! closed loop.
 //!
 //! The open loop is `L = Y Y_c`, where Y is the sampled response of the estimate and Y_c is exact. The errors follow
-//! from the covariance of the real and imaginary part of `dL/L = dY/Y`. A crossing of `|L| = 1` and the phase at this
+//! from the covariance of the real and imaginary parts of `dL/L = dY/Y`. A crossing of `|L| = 1` and the phase at this
 //! crossing change as in [`super::open_loop`]. A crossing of the negative real axis changes by
 //! `d omega = -Im(dL/L)/Im(d ln L/d omega)`, so the gain margin changes by
 //! `-(20/ln 10) (Re(dL/L) + Re(d ln L/d omega) d omega)` dB.
 //!
 //! An unstable closed loop can become stable only if L passes through -1 at some frequency. The squared distance of L
-//! from -1, in standard errors, is the minimum of `(1 + L)' C_L^-1 (1 + L)` over frequency. For a loop at the stability
-//! limit this distance has a chi-squared distribution with two degrees of freedom.
+//! from -1, in standard errors, is the minimum of `(1 + L)' C_L^-1 (1 + L)` over frequency. If the true loop passes
+//! through -1, the squared distance at that frequency has a chi-squared distribution with two degrees of freedom, and
+//! the minimum does not exceed it.
 
 use std::f64::consts::LN_10;
 
@@ -24,7 +25,7 @@ use super::{
     open_loop::{Crossover, unwrapped_margin_deg},
 };
 
-/// Frequency range in which crossings are searched, rad/s.
+/// Frequency range in which crossings are searched for, rad/s.
 const SEARCH_RANGE_RAD_S: (f64, f64) = (0.05, 60.0);
 /// Largest plausible phase margin of a person, deg.
 const LARGEST_MARGIN_DEG: f64 = 120.0;
@@ -43,7 +44,7 @@ pub struct LoopShape {
     pub gain_margin: Option<(Estimate, Estimate)>,
     /// Number of closed-loop poles in the right half plane; `None` if it cannot be determined.
     pub unstable_poles: Option<usize>,
-    /// Smallest chi-squared of a change of the operator that brings the loop to the stability limit; `None` without a
+    /// Smallest chi-squared of a change in the operator that brings the loop to the stability limit; `None` without a
     /// covariance or for a loop that is not unstable.
     distance: Option<f64>,
     /// Phase margin in deg at the lowest crossover, with the phase unwrapped from low frequencies.
@@ -163,7 +164,7 @@ impl LoopShape {
     }
 }
 
-/// Returns the smallest chi-squared of a change of the operator for which L passes through -1.
+/// Returns the smallest chi-squared of a change in the operator for which L passes through -1.
 fn distance_from_stability_limit(
     operator: &impl Fn(f64) -> KnownResponse,
     element: &ContinuousTransferFunction,
@@ -175,7 +176,7 @@ fn distance_from_stability_limit(
         let omega = at(i);
         let known = operator(omega);
         let [[a, b], [_, c]] = known.relative?;
-        // Relative change of Y that moves L to -1, except for its sign: (1 + L)/L.
+        // Relative change in Y that moves L to -1, except for its sign: (1 + L)/L.
         let open_loop = known.value * element.response(omega);
         let d = (Complex64::new(1.0, 0.0) + open_loop) / open_loop;
         // For a single parameter the covariance has rank one; the increased diagonal makes it regular.
@@ -225,10 +226,10 @@ mod tests {
             "{}",
             doubt.message
         );
-        // With large errors the loop may be stable.
+        // If the errors are large, the loop may be stable.
         let note = shape(resonant_loop, Some(0.3)).finding(1.0).unwrap();
         assert_eq!(note.severity, hoid_model::Severity::Note);
-        // Without errors the values are used.
+        // Without standard errors the estimates alone decide.
         assert_eq!(
             shape(resonant_loop, None).finding(1.0).unwrap().severity,
             hoid_model::Severity::Doubt
@@ -270,7 +271,7 @@ mod tests {
             assert_eq!(found.finding(0.0).unwrap().kind, "no-crossover");
             assert_eq!(found.gain_margin, None);
         }
-        // Reversed sign.
+        // The loop has the wrong sign.
         let found = shape(|w| Complex64::from_polar(-1.0, -0.15 * w), Some(1e-6));
         assert_eq!(found.finding(1.0).unwrap().kind, "unstable-loop");
     }

@@ -311,7 +311,7 @@ mod tests {
         let held = fit_record(record(&truth().zoh(ts).unwrap(), 0.0));
         assert!(largest_error(&held, 0.243) < 1e-10);
         assert_eq!((held.intersample, held.delay_if_linear_s(0)), (Intersample::Zoh, None));
-        // A piecewise linear error; the delay is half a sample longer than this model shows.
+        // For a piecewise linear error the estimated delay is half a sample longer than in `X`.
         let straight = fit_record(record(&truth().interpolate(ts).unwrap(), 0.0));
         assert!(largest_error(&straight, 0.243 + 0.0125) < 1e-10);
         assert_eq!(

@@ -91,7 +91,7 @@ fn interval(components: &[Component], total: f64, clusters: usize) -> Option<(f6
         let reach = if x < value { value - low } else { high - value };
         match (x - value) / reach {
             z if z.is_finite() => student.cdf(quantile * z),
-            // The form has no error, or its estimate is infinite.
+            // The form has no standard error, or its estimate is infinite.
             _ if x < value => 0.0,
             _ => 1.0,
         }
@@ -135,7 +135,7 @@ fn interval(components: &[Component], total: f64, clusters: usize) -> Option<(f6
     Some((low, high))
 }
 
-/// Returns estimate and interval for a larger standard error: the distances of the ends from the estimate grow in
+/// Returns the estimate and interval for a larger standard error: the distances of the ends from the estimate grow in
 /// proportion to the standard error.
 pub(super) fn widen_interval(
     of: Estimate,
@@ -181,7 +181,8 @@ mod tests {
         assert_eq!(Mixture::of(&[], 8), None);
     }
 
-    /// Two forms that are three standard errors apart: mean and variance by hand, the interval from its probability.
+    /// Two forms differ by several standard errors: the mean and the variance are computed by hand, and the interval is
+    /// checked by its probability.
     #[test]
     fn differing_forms_increase_the_error() {
         let many = 1_000_000;
@@ -210,7 +211,7 @@ mod tests {
         let high = |weight| Mixture::of(&[closed, open(weight)], 8).unwrap().interval.unwrap().1;
         assert!(high(0.2).is_infinite());
         assert!(high(0.01).is_finite());
-        // A pure integration in one form.
+        // One form is a pure integration.
         let infinite = Component {
             estimate: Estimate::fixed(f64::INFINITY),
             ..open(0.2)

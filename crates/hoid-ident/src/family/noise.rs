@@ -172,7 +172,8 @@ mod tests {
             "{fit:?}"
         );
         assert!((fit.loss - 1.0 / 12.0).abs() < 0.01);
-        // Akaike's criterion never selects too low an order, and excess coefficients reduce the loss only slightly.
+        // With this many samples Akaike's criterion does not select too low an order, and excess coefficients reduce
+        // the loss only slightly.
         let order = products.best_order(0..=8, Penalty::Akaike).unwrap();
         let gained = 1.0 - products.fit(order).unwrap().loss / fit.loss;
         assert!(order >= 2 && gained < 0.003, "{order} {gained}");
@@ -180,7 +181,7 @@ mod tests {
 
     #[test]
     fn arma_model_is_found_by_two_regressions() {
-        // A moving average of the series above: v = w + 0.6 w(t-1), where w is the autoregression.
+        // The series is a moving average of the one above: v = w + 0.6 w(t-1), where w is the autoregression.
         let w = series(8000);
         let v: Vec<f64> = (1..w.len()).map(|t| w[t] + 0.6 * w[t - 1]).collect();
         let found = hannan_rissanen(&[v], (1, 2), 24).unwrap();

@@ -4,9 +4,9 @@
 //! The poles determine the lag and the neuromuscular system ([`super::pole_reading`]).
 //!
 //! Apart from its poles, the exact model of an operator ([`FamilyOperator::zoh`]) has only a gain, leads and a delay,
-//! often fewer parameters than B has coefficients, so estimated polynomials do not exactly correspond to an operator.
-//! The conversion finds the operator whose exact model M(x) is closest to the response H of the polynomials over the
-//! band of manual control,
+//! which are often fewer parameters than B has coefficients, so estimated polynomials do not exactly correspond to an
+//! operator. The conversion finds the operator whose exact model M(x) is closest to the response H of the polynomials
+//! over the band of manual control,
 //!
 //! `min_x sum_j |H(omega_j) - M(omega_j, x)|^2 / |H(omega_j)|^2`.
 //!
@@ -69,7 +69,7 @@ pub struct FamilyConversion {
 }
 
 impl FamilyConversion {
-    /// Returns names, units, values and first-order standard errors of the parameters.
+    /// Returns the names, units, values and first-order standard errors of the parameters.
     pub fn parameters(&self) -> Vec<(&'static str, &'static str, Estimate)> {
         let all = self.operator.named_estimates(self.covariance.as_deref());
         all.into_iter()
@@ -528,13 +528,13 @@ mod tests {
     #[test]
     fn polynomials_without_an_operator_are_refused() {
         let refused = |m: &PolynomialModel, form| family_from_polynomials(m, None, form).unwrap_err().to_string();
-        // Four poles, an unstable pole, a negative pole, and no delay.
+        // Four poles, an unstable pole, a negative real pole and a missing delay are rejected.
         let four = polynomials(9, &[0.1, 0.1], &[-0.5, 0.2, 0.0, 0.01]);
         assert!(refused(&four, None).contains("one to three poles, found 4"));
         assert!(refused(&polynomials(9, &[0.1], &[-1.2]), None).contains("not stable"));
         assert!(refused(&polynomials(9, &[0.1], &[0.5]), None).contains("negative real axis"));
         assert!(refused(&polynomials(0, &[0.1], &[-0.5]), None).contains("nk = 0"));
-        // A resonance in B that no form has.
+        // B has lightly damped zeros, which no form has.
         let notch = polynomials(9, &[1.0, -1.98, 0.995], &[-1.7, 0.75]);
         assert!(refused(&notch, None).contains("the response of the nearest operator"));
         let lead_lag = exact_polynomials(&operators()[3]);

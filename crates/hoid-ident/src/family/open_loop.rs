@@ -19,7 +19,7 @@ use super::{
     mixture::{Component, Mixture, widen_interval},
 };
 
-/// Frequency range in which crossovers are searched, rad/s.
+/// Frequency range in which crossovers are searched for, rad/s.
 const SEARCH_RANGE_RAD_S: (f64, f64) = (0.05, 60.0);
 /// 97.5 % quantile of the normal distribution.
 const NORMAL_QUANTILE: f64 = 1.959_963_984_540_054;
@@ -37,15 +37,17 @@ pub struct LoopMeasures {
     pub phase_margin_deg: Estimate,
     /// 95 % interval of the phase margin, deg.
     pub phase_margin_interval: Option<(f64, f64)>,
-    /// Derivatives of crossover frequency and phase margin with respect to the logarithm of the gain, `d/d ln K`.
+    /// Derivatives of the crossover frequency and the phase margin with respect to the logarithm of the gain,
+    /// `d/d ln K`.
     by_gain: [f64; 2],
-    /// Standard errors of crossover frequency and phase margin for the person, whose gain varies from run to run.
+    /// Standard errors of the crossover frequency and the phase margin for the person, whose gain varies from run to
+    /// run.
     pub of_person: [Option<f64>; 2],
 }
 
 impl LoopMeasures {
-    /// Returns crossover and phase margin of a sampled response with this controlled element; `None` if `|L|` does not
-    /// fall below one.
+    /// Returns the crossover and the phase margin of a sampled response with this controlled element; `None` if `|L|`
+    /// does not fall below one.
     pub(super) fn of_response(
         response: impl Fn(f64) -> KnownResponse,
         element: &ContinuousTransferFunction,
@@ -202,7 +204,7 @@ impl Crossover {
         self.slope
     }
 
-    /// Returns the changes of the crossover frequency in rad/s and of the phase margin in deg for a relative change
+    /// Returns the changes in the crossover frequency (in rad/s) and in the phase margin (in deg) for a relative change
     /// `dL/L` of the open loop.
     pub fn shift_for(&self, relative: Complex64) -> [f64; 2] {
         let by_crossover = -relative.re / self.slope.re;
@@ -229,8 +231,9 @@ pub fn unwrapped_margin_deg(open_loop: impl Fn(f64) -> Complex64, crossover_rad_
     180.0 + phase.to_degrees()
 }
 
-/// Returns the root of a function that is positive at `low` and negative at `high`, to rounding accuracy. Regula falsi,
-/// with halving of the function value at a retained end (M. Dowell and P. Jarratt, *BIT* 11 (1971) 168-174).
+/// Returns the root of a function that is positive at `low` and negative at `high`, to rounding accuracy. The method is
+/// regula falsi with halving of the function value at a retained end (M. Dowell and P. Jarratt, *BIT* 11 (1971)
+/// 168-174).
 fn find_root(of: impl Fn(f64) -> f64, mut low: (f64, f64), mut high: (f64, f64)) -> f64 {
     let (mut last, mut was_positive) = (low.0, None);
     for _ in 0..80 {
@@ -258,7 +261,7 @@ fn find_root(of: impl Fn(f64) -> f64, mut low: (f64, f64), mut high: (f64, f64))
     last
 }
 
-/// Returns crossover and phase margin of an operator with this controlled element, given the covariance of its
+/// Returns the crossover and the phase margin of an operator with this controlled element, given the covariance of its
 /// coordinates and the sample time and intersample behaviour of the error. `None` if `|L|` does not fall below one.
 pub fn loop_measures(
     operator: &FamilyOperator,
@@ -288,7 +291,7 @@ mod tests {
         let element = ContinuousTransferFunction::new(&[1.0], &[1.0, 0.0]).unwrap();
         let found = loop_measures(&gain, None, &element, (SampleTime::new(1e-4).unwrap(), AUTO)).unwrap();
         assert!((found.crossover_rad_s.value - 2.0).abs() < 1e-3);
-        // 90 deg minus the phase lags of the delay and of the neuromuscular part (2 zeta/omega).
+        // The margin is 90 deg minus the phase lags of the delay and of the neuromuscular part (2 zeta/omega).
         let expected = 90.0 - (2.0_f64 * (0.1 + 0.014)).to_degrees();
         assert!((found.phase_margin_deg.value - expected).abs() < 0.1);
     }

@@ -21,7 +21,7 @@ pub const HIGHEST_NOISE_ORDER: usize = MAX_ORDER;
 const NOISE_SPAN_S: f64 = 0.5;
 /// Highest order of the default search at low rates, and for few samples.
 const MIN_HIGHEST_ND: usize = 24;
-/// Number of samples for each order above [`MIN_HIGHEST_ND`] in the default search: Akaike's criterion takes too high
+/// Number of samples for each order above [`MIN_HIGHEST_ND`] in the default search: Akaike's criterion selects too high
 /// an order if the number of coefficients is not small compared with the number of samples.
 const SAMPLES_PER_ORDER: usize = 40;
 /// Highest nd that is searched by default if nc is above zero: an ARMA model needs few coefficients.
@@ -43,7 +43,8 @@ pub struct FamilyEstimator {
     pub intersample: Intersample,
     /// Candidate orders nc of the noise model. Default 0.
     pub nc: RangeInclusive<usize>,
-    /// Candidate orders nd of the noise model; if `None`, from 0 to half a second, at least 24. Default `None`.
+    /// Candidate orders nd of the noise model; if `None`, from 0 to the order that spans half a second, at least 24.
+    /// Default `None`.
     pub nd: Option<RangeInclusive<usize>>,
     /// Further inputs that the person sees or feels, as channels of the records. Default none.
     pub channels: Vec<SeenChannel>,
@@ -107,13 +108,13 @@ impl FamilyEstimator {
         }
     }
 
-    /// Candidate orders nd; of an estimator without them, those of few samples.
+    /// Returns the candidate orders nd; if none are given, the default orders for few samples.
     pub(super) fn nd(&self) -> RangeInclusive<usize> {
         self.nd.clone().unwrap_or(0..=MIN_HIGHEST_ND)
     }
 
     /// Sets the orders nc and nd of the noise model. If nc is not given it is zero. If nd is not given it is searched
-    /// up to half a second, or up to 8 if nc is above zero.
+    /// up to the order that spans half a second, or up to 8 if nc is above zero.
     ///
     /// # Errors
     /// [`IdentError::BadOption`] for the name of any other order, and for an order above [`HIGHEST_NOISE_ORDER`].
@@ -250,8 +251,8 @@ impl FamilyEstimator {
 
 fn intersample_setting() -> Setting {
     let help = "Behaviour of e between samples: held (zoh), linear (foh: e was logged from a faster or continuous \
-                signal; tau_e is half a sample longer), or (auto) zoh or foh if noise-free data show it, else smooth \
-                with the delay for a held e";
+                signal; tau_e is half a sample longer), or auto (zoh or foh if noise-free data show which applies, \
+                else smooth, with tau_e as for a held e)";
     Setting::new("intersample", Kind::Choice(&Intersample::NAMES), help).default("auto")
 }
 
@@ -293,7 +294,7 @@ mod tests {
             [20.0, 60.0, 100.0, 200.0].map(|rate| highest(rate, 80.0, None)),
             [24, 30, 50, 64]
         );
-        // Few samples, and a range of the user.
+        // With few samples the highest order is lower; a range given by the user is kept.
         assert_eq!((highest(100.0, 12.0, None), highest(100.0, 4.0, None)), (30, 24));
         assert_eq!(highest(100.0, 80.0, Some(1..=3)), 3);
     }

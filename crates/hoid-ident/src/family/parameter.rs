@@ -86,8 +86,8 @@ impl Parameter {
         }
     }
 
-    /// Returns the weighted mean of a parameter over the forms. `each` contains form, weight and parameter, the best form
-    /// first.
+    /// Returns the weighted mean of a parameter over the forms. `each` contains the form, the weight and the parameter,
+    /// with the best form first.
     pub(super) fn average(each: &[(Form, f64, &Self)], clusters: usize) -> Option<Self> {
         let (_, _, front) = *each.first()?;
         // A parameter at a bound has no error and is omitted from the mean, but not from the interval.
@@ -195,8 +195,8 @@ impl CoordinateEstimate<'_> {
         all.iter().position(|c| *c == wanted)
     }
 
-    /// Returns the standard error of a coordinate; `None` at a bound. For a delay with an interval of its own, it is the
-    /// error to which the width of the interval corresponds.
+    /// Returns the standard error of a coordinate; `None` at a bound. For a delay with an interval of its own, it is
+    /// the error to which the width of the interval corresponds.
     fn standard_error(&self, i: usize) -> Option<f64> {
         let x = self.operator.coordinates();
         let (low, high) = self.limits[i];
@@ -308,7 +308,7 @@ impl CoordinateEstimate<'_> {
             }
             return made;
         }
-        // Change of the logarithm of the product y: d ln y = dx_g/x_g +- dx_o/x_o, with the gain x_g and the other
+        // Change in the logarithm of the product y: d ln y = dx_g/x_g +- dx_o/x_o, with the gain x_g and the other
         // factor x_o.
         let variance = c[gain * p + gain] / (x[gain] * x[gain])
             + c[other * p + other] / (x[other] * x[other])
@@ -458,7 +458,8 @@ mod tests {
         assert_eq!(Parameter::average(&[], 8), None);
     }
 
-    /// T_I of a pure integration has no error. It is not part of the mean, but the interval has no upper limit.
+    /// T_I of a pure integration has no standard error. It is not part of the mean, but the interval has no upper
+    /// limit.
     #[test]
     fn interval_includes_a_weighted_form_at_a_bound() {
         let known = parameters_with_lag(0.2, 0.02);
@@ -493,7 +494,7 @@ mod tests {
         assert!(ratio.determined && ratio.interval.unwrap() == (4.6, 5.4));
         // The prior determines the damping ratio, the data determine the frequency.
         assert!(!of(&all, "zeta_nm").determined && of(&all, "omega_nm").determined);
-        // At the bound: a pure integration.
+        // At the bound the lag is a pure integration.
         let at_bound = parameters_with_lag(1e-3, 0.02);
         assert!(of(&at_bound, "T_I").value.is_infinite() && of(&at_bound, "K").value.is_infinite());
     }

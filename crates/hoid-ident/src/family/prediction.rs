@@ -42,7 +42,7 @@ pub(super) const EQUAL_RESIDUAL_POWER: f64 = 1e-18;
 const MAX_ROUNDS: usize = 3;
 /// Number of steps after which a search from a further start ends if its objective is above the known one.
 const TRIAL_STEPS: usize = 30;
-/// Relative change of the weight of the prior below which no further round is needed.
+/// Relative change in the weight of the prior below which no further round is needed.
 const WEIGHT_TOLERANCE: f64 = 0.05;
 
 /// The records, and the settings common to all forms.
@@ -148,8 +148,8 @@ impl<'a> PredictionProblem<'a> {
         found.ok_or(IdentError::NoFiniteLoss)
     }
 
-    /// Like [`PredictionProblem::fit`], but returns `None` if the objective remains above `known`, the objective of a fit
-    /// of the same form from another start. The first steps decide: later rounds give the prior more weight, which
+    /// Like [`PredictionProblem::fit`], but returns `None` if the objective remains above `known`, the objective of a
+    /// fit of the same form from another start. The first steps decide: later rounds give the prior more weight, which
     /// increases the objective.
     ///
     /// # Errors

@@ -20,7 +20,7 @@ pub(super) struct PredictionFit<'a> {
     pub clusters: Clusters,
     /// Inflation kappa of the variances.
     pub inflation: f64,
-    /// Relative increase of the diagonal of `G + P`: zero, or [`UNDETERMINED_RIDGE`] if a combination of parameters is
+    /// Relative increase in the diagonal of `G + P`: zero, or [`UNDETERMINED_RIDGE`] if a combination of parameters is
     /// undetermined. This combination then has a very large error; quantities that do not depend on it are unaffected.
     pub ridge: f64,
     /// Weight w of the lines ([`super::joint`]); zero if the criterion does not include lines.

@@ -2,7 +2,7 @@
 //!
 //! A short tracking record carries little information about the neuromuscular system, whose resonance is above the
 //! excited frequencies. A weak prior keeps the parameters in the range of people, and has almost no effect if the data
-//! determine them. A positive parameter x has a log-normal prior, `ln x ~ N(ln centre, spread)`, so the spread is
+//! determine them. A positive parameter x has a log-normal prior, `ln x ~ N(ln centre, spread^2)`, so the spread is
 //! relative. In the criterion the prior is an additional measurement of the parameter (a maximum a posteriori estimate;
 //! L. Ljung, *System Identification*, 1999, section 7.4).
 //!
@@ -68,7 +68,7 @@ impl OperatorPrior {
     }
 
     /// Returns the prior for people in manual control: omega_nm 10.5 rad/s within 30 %, zeta_nm 0.3 within a factor of
-    /// 1.6, tau_e 0.2 s within a factor of two, each for one standard deviation.
+    /// 1.6, tau_e 0.2 s within a factor of two; each range is plus or minus one standard deviation.
     pub fn population() -> Self {
         let entry = |parameter: &str, centre, spread| ParameterPrior {
             parameter: parameter.to_owned(),
@@ -296,7 +296,7 @@ mod tests {
 
     #[test]
     fn removing_the_prior_pull_gives_the_fit_without_prior() {
-        // By hand: the data at ln 8 with three quarters of the information, the prior at ln 10.5.
+        // Computed by hand: the data are at ln 8 with three quarters of the information, and the prior is at ln 10.5.
         let (data, prior, share): (f64, f64, f64) = (8.0, 10.5, 0.25);
         let both = ((1.0 - share) * data.ln() + share * prior.ln()).exp();
         let found = parameter("omega_nm[2]", both, share);
@@ -310,7 +310,7 @@ mod tests {
         ];
         assert!(none.iter().all(|p| OperatorPrior::population().pull(p).is_none()));
 
-        // Also for two fits, to first order.
+        // The same holds for two fits, to first order.
         let (population, task) = (Population::default(), Task::default());
         let kind = RemnantKind::BroadBand;
         let person = Person::draw(

@@ -346,7 +346,7 @@ mod tests {
         assert!(pairs.all(|d| d < 1e-4), "{found:?} {direct:?}");
     }
 
-    /// An operator with a lead and no integration is a quadratic integration with a gain of zero.
+    /// An operator with a lead and no integration is the limit of the quadratic integration for a gain of zero.
     #[test]
     fn search_for_an_integration_that_is_missing_ends_at_its_bound() {
         let ts = SampleTime::AT_100_HZ;
@@ -407,7 +407,7 @@ mod tests {
 
     #[test]
     fn errors_match_the_scatter_of_repeated_measurements() {
-        // 400 measurements with a fixed seed: the standard deviations are accurate to 3.5 %.
+        // With 400 simulated measurements the standard deviations are accurate to 3.5 %.
         let mut state = 5_u64;
         let mut uniform = move || {
             state = state
@@ -428,7 +428,7 @@ mod tests {
         let mut all = Vec::new();
         let mut covariance = Vec::new();
         for _ in 0..400 {
-            // Twelve uniform deviates: variance 1.
+            // The sum of twelve uniform deviates has a variance of 1.
             let mut normal = || (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
             let noisy: Vec<MeasuredResponse> = exact
                 .iter()

@@ -46,7 +46,7 @@ pub struct OperatorOfRecord {
 pub struct WeighedForm {
     /// The form.
     pub form: Form,
-    /// Weight of the form; the weights of all forms have the sum one.
+    /// Weight of the form; the weights of all forms sum to one.
     pub weight: f64,
     /// Operators in this form: one for all records, or one for each record.
     pub operators: Vec<OperatorInForm>,
@@ -168,7 +168,7 @@ pub(super) fn title(form: Form, neuromuscular: bool, (nc, nd): (usize, usize)) -
 }
 
 impl FamilyFit {
-    /// Returns form and noise model as one line of text, equal to [`Fit::title`] of the polynomial form.
+    /// Returns the form and the noise model as one line of text, equal to [`Fit::title`] of the polynomial form.
     pub fn title(&self) -> String {
         title(self.form, self.neuromuscular, self.noise_orders)
     }
@@ -191,8 +191,8 @@ impl FamilyFit {
         &self.operators[record.min(self.operators.len() - 1)]
     }
 
-    /// Returns crossover frequency and phase margin of the operator of a record with a controlled element, averaged
-    /// over the forms. `None` if the loop has no crossover in the best form.
+    /// Returns the crossover frequency and the phase margin of the operator of a record with a controlled element,
+    /// averaged over the forms. `None` if the loop has no crossover in the best form.
     pub fn loop_measures(&self, record: usize, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
         let each = self.weighed.iter().map(|form| {
             let of = form.of(record)?;
@@ -222,9 +222,9 @@ impl FamilyFit {
         (!self.course_is_known).then(|| tau + 0.5 * self.sample_time.s() - self.lead_s)
     }
 
-    /// Returns gain and phase from e to u of the operator of a record, at frequencies in rad/s, including the
-    /// intersample behaviour of the error. The result is the mean of `ln H` over the forms, and its error includes the
-    /// differences between the forms.
+    /// Returns the gain and phase of the response from e to u of the operator of a record, at frequencies in rad/s,
+    /// including the intersample behaviour of the error. The result is the mean of `ln H` over the forms, and its error
+    /// includes the differences between the forms.
     pub fn frequency_response(&self, record: usize, omega_rad_s: &[f64]) -> Vec<ResponsePoint> {
         let front = &self.operator(record).operator;
         let point = |&omega: &f64| {
@@ -287,15 +287,15 @@ impl FamilyFit {
         LoopShape::of(known, element, self.sample_time)
     }
 
-    /// Returns crossover frequency and phase margin of the operator fitted at the lines; `None` without such a fit or
-    /// without a crossover.
+    /// Returns the crossover frequency and the phase margin of the operator fitted at the lines; `None` without such a
+    /// fit or without a crossover.
     pub fn loop_measures_at_lines(&self, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
         let lines = self.lines.as_ref()?;
         self.measures_of_operator(&lines.operator, lines.covariance.as_deref(), element)
     }
 
-    /// Returns crossover frequency and phase margin of the operator estimated by refined instrumental variables; `None`
-    /// without this operator or without a crossover.
+    /// Returns the crossover frequency and the phase margin of the operator estimated by refined instrumental
+    /// variables; `None` without this operator or without a crossover.
     pub fn loop_measures_by_instruments(&self, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
         let found = self.instrumental.as_ref()?;
         self.measures_of_operator(&found.operator, found.covariance.as_deref(), element)
@@ -359,7 +359,8 @@ mod tests {
 
     use crate::family::{FamilyEstimator, loop_measures};
 
-    /// A person with a lead is fitted by a gain: response, crossover and margin follow the lines, within their errors.
+    /// A person with a lead is fitted by a gain: the response, the crossover and the phase margin follow the lines
+    /// within their errors.
     #[test]
     fn response_follows_the_lines_if_the_form_is_wrong() {
         let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();

@@ -1,19 +1,19 @@
 //! Effect of the choice of a noise model on the estimate.
 //!
-//! In a closed loop an error of the noise model biases the prediction error method: the bias is proportional to this
+//! In a closed loop an error in the noise model biases the prediction error method: the bias is proportional to this
 //! error and to the part of the spectrum of e that is due to the remnant (L. Ljung, *System Identification*, 1999,
 //! section 13.4). The scatter between runs does not show this bias, since all runs share it. The remnant of people is
 //! not an autoregression of any order. To estimate the bias, the same form is fitted with other noise models:
 //! autoregressions of half and all of the highest order, and an ARMA model with the orders (4, 5) of a sampled sum of a
-//! drift, a broad-band signal and a resonance. Each difference from such a fit is treated as a bias,
-//! and its square is added to the covariance. If there is a fit at the lines, the difference from this fit is used
-//! instead. For coordinates that the prior determines in the fit at the lines, the other noise models are used as well.
-//! The differences from them then enlarge the errors of single elements only, since the lines determine the response in
-//! the band of manual control, and thus crossover and margin.
+//! drift, a broad-band signal and a resonance. Each difference from such a fit is treated as a bias, and its square is
+//! added to the covariance. If there is a fit at the lines, the difference from this fit is used instead. For
+//! coordinates that the prior determines in the fit at the lines, the other noise models are used as well. The
+//! differences from them then enlarge the errors of single elements only, since the lines determine the response in the
+//! band of manual control, and thus the crossover and the phase margin.
 //!
 //! With little noise, both intersample behaviours of the error may fit. They differ by `sin(x)/x`, which a lead can
-//! replace, so the parameters differ by more than their errors. If the records do not show the behaviour, the fit with
-//! the other one counts in the same way.
+//! replace, so the parameters differ by more than their errors. If the records do not show the behaviour, the
+//! difference from the fit with the other one is also treated as a bias.
 //!
 //! **Without lines** the differences show the bias only if the noise models span the time in which the operator
 //! responds, so the highest order spans half a second ([`super::options`]): with at most 24 samples, 0.24 s at 100 Hz,

@@ -6,13 +6,13 @@
 //! 1. **At the lines**, if there are lines: the form fitted to the describing function.
 //! 2. **From the response of a high-order ARX model** ([`super::arx_response`]): minima of
 //!    `chi^2 = sum_j 2 |H_j - Y(j omega_j)|^2 / v_j`, searched from the best grid point of each delay, with a prior and
-//!    without one. With a prior the search avoids minima far from people; without one it finds a person far from them.
-//!    The errors of H are correlated between frequencies, which chi^2 ignores, so its least minimum need not belong to
-//!    the operator. The minima are therefore ranked by their prediction error `n ln V + sum_i (g_i - m_i)^2/s_i^2`,
-//!    where V is the innovation variance of an autoregression of `u - Y e`, and the best of them that differ in their
-//!    responses are starts.
+//!    without one. With a prior the search avoids minima that are implausible for people; without one it also finds the
+//!    operator of an atypical person. The errors of H are correlated between frequencies, which chi^2 ignores, so its
+//!    lowest minimum need not belong to the operator. The minima are therefore ranked by their prediction error
+//!    `n ln V + sum_i (g_i - m_i)^2/s_i^2`, where V is the innovation variance of an autoregression of `u - Y e`, and
+//!    the best of them that differ in their responses are starts.
 //!
-//! The noise model has the orders of the start with the least prediction error.
+//! The noise model has the orders that are selected for the start with the smallest prediction error.
 
 use hoid_model::Form;
 

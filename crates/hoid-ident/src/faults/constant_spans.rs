@@ -171,14 +171,14 @@ mod tests {
     fn stick_in_its_dead_zone_is_not_frozen() {
         let e = autoregressive_signal(9000, 1);
         let zone = |v: &f64| v - v.clamp(-4.0, 4.0);
-        // Slow, like a hand.
+        // The signal is slow, like the movement of a hand.
         let slow = autoregressive_signal(1125, 2).into_iter().flat_map(|v| [zone(&v); 8]);
         let mut u: Vec<f64> = slow.collect();
         assert!(frozen_holds(&u, Some(&e), 0.01).is_empty());
         // The stick is released for five seconds, which is normal.
         u[3000..3500].fill(0.0);
         assert!(frozen_holds(&u, Some(&e), 0.01).is_empty());
-        // Held at a value other than the rest, and at the rest for most of a minute.
+        // The stick is held at a value other than the rest, and at the rest for most of a minute.
         u[1000..1400].fill(2.125);
         u[3900..8900].fill(0.0);
         let found = frozen_holds(&u, Some(&e), 0.01);

@@ -9,7 +9,7 @@
 //! from past samples is consistent for any feedback (L. Ljung, *System Identification*, 1999, section 13.4).
 //!
 //! **Exchanged.** A person responds only after a delay of a tenth of a second or more; a controlled element responds
-//! immediately. The significance of lag j is the relative increase of the loss without it: for b_1,
+//! immediately. The significance of lag j is the relative increase in the loss without it: for b_1,
 //! `R = (V_without - V)/V`. If e responds to u with a delay and u responds to e immediately, i.e. if `R` of u exceeds
 //! both [`MIN_IMMEDIATE_INCREASE`] and [`MIN_INCREASE_RATIO`] times `R` of e, input and output are exchanged. If
 //! neither responds immediately, nothing is reported.
@@ -27,16 +27,16 @@ const BLOCK_S: f64 = 0.05;
 /// Numbers of past blocks in the regression: of the channel itself, and of the other channel.
 const OWN_LAG_COUNT: usize = 8;
 const OTHER_LAG_COUNT: usize = 12;
-/// Relative increase of the loss without the first lag above which a response is immediate.
+/// Relative increase in the loss without the first lag above which a response is immediate.
 const MIN_IMMEDIATE_INCREASE: f64 = 0.1;
-/// For exchanged channels, minimum ratio of the increase of the loss for u to the increase for e.
+/// For exchanged channels, minimum ratio of the increase in the loss for u to the increase for e.
 const MIN_INCREASE_RATIO: f64 = 20.0;
 /// The sum of the coefficients `b_j` counts as negative if it is more than this number of standard errors below zero.
 const MIN_NEGATIVE_STANDARD_ERRORS: f64 = 4.0;
 /// Minimum number of blocks for a test.
 const MIN_BLOCKS: usize = 200;
 
-/// Returns a wrong direction and its statistic: for exchanged channels the ratio of the increases of the loss, for a
+/// Returns a wrong direction and its statistic: for exchanged channels the ratio of the increases in the loss, for a
 /// wrong sign the number of standard errors. `None` if no fault is found, or if the record is too short or its sample
 /// time is too long for the test.
 pub(super) fn find_wrong_direction(record: &Record) -> Option<(FaultKind, f64)> {
@@ -64,7 +64,7 @@ pub(super) fn find_wrong_direction(record: &Record) -> Option<(FaultKind, f64)> 
 
 /// Response of one channel to another.
 struct CrossResponse {
-    /// Relative increase of the loss if the first lag of the other channel is omitted.
+    /// Relative increase in the loss if the first lag of the other channel is omitted.
     immediate_effect: f64,
     /// Sum of the coefficients of the other channel, in standard errors.
     sum: f64,
@@ -99,7 +99,7 @@ impl CrossResponse {
             for j in i + 1..size {
                 gram[i * size + j] = gram[j * size + i];
             }
-            // Keeps the matrix of a smooth channel regular in spite of rounding.
+            // This keeps the matrix of a smooth channel regular in spite of rounding.
             gram[i * size + i] *= 1.0 + 1e-9;
         }
         let without = |left_out: Option<usize>| -> Option<(f64, Vec<f64>)> {

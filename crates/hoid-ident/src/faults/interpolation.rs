@@ -69,12 +69,12 @@ impl Interpolation {
         self.y.len()
     }
 
-    /// Returns the decrease of the sum of squares if the first m samples are interpolated.
+    /// Returns the decrease in the sum of squares if the first m samples are interpolated.
     pub fn sum_decrease(&self, m: usize) -> f64 {
         self.y[..m].iter().map(|y| y * y).sum()
     }
 
-    /// Returns delta, the change of each of the first m samples.
+    /// Returns delta, the change in each of the first m samples.
     pub fn change(&self, m: usize) -> Vec<f64> {
         let mut delta = vec![0.0; m];
         for i in (0..m).rev() {
@@ -85,7 +85,7 @@ impl Interpolation {
     }
 }
 
-/// Updates the innovations after a change of the samples from `start` on.
+/// Updates the innovations after a change in the samples from `start` on.
 pub(super) fn apply_change(ar: &Autoregression, eps: &mut [f64], start: usize, delta: &[f64]) {
     let p = ar.order();
     for (i, change) in delta.iter().enumerate() {

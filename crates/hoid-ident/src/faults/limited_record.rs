@@ -5,10 +5,10 @@
 //! limit, `x(t) - r + c s sign(r)` (a two-sided version of the filter cleaner of R. D. Martin and D. J. Thomson, *Proc.
 //! IEEE* 70 (1982) 1097-1115). The sample with the largest error is moved first, and its neighbours are then examined
 //! again: an outlier affects the interpolation of its neighbours, which would otherwise be moved instead. This bounds
-//! the effect of any sample of e or u on subsequent filters, and thus its leverage on theta. c =
-//! [`INTERPOLATION_ERROR_LIMIT`]: in a normal channel one sample in 16 000 is moved. If a fit to this record differs
-//! from the fit to the original record, a few samples dominate the fit; if no sample is moved, the two fits are
-//! identical.
+//! the effect of any sample of e or u on subsequent filters, and thus its leverage on theta. With c =
+//! [`INTERPOLATION_ERROR_LIMIT`], one sample in 16 000 of a normally distributed channel is moved. If a fit to this
+//! record differs from the fit to the original record, a few samples dominate the fit; if no sample is moved, the two
+//! fits are identical.
 
 use std::{cmp::Ordering, collections::BinaryHeap};
 

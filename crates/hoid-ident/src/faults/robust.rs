@@ -1,9 +1,9 @@
 //! Estimates of level and scale that are robust to faults.
 //!
-//! The deviation of a channel is the larger of two estimates, which agree for a normal channel: its median absolute
-//! deviation from the median over 0.6745, and the 90 % quantile of the absolute deviation over 1.6449. The second
-//! remains valid if a hand rests more than half of the time. If both vanish, the deviation is the root mean square
-//! deviation without the largest half per cent (P. J. Huber, *Robust Statistics*, 1981, ch. 5).
+//! The deviation of a channel is the larger of two estimates, which agree for a normally distributed channel: its
+//! median absolute deviation from the median over 0.6745, and the 90 % quantile of the absolute deviation over 1.6449.
+//! The second remains valid if a hand rests more than half of the time. If both vanish, the deviation is the root mean
+//! square deviation without the largest half per cent (P. J. Huber, *Robust Statistics*, 1981, ch. 5).
 
 use hoid_numerics::statistics::{nearest_quantile, upper_median};
 

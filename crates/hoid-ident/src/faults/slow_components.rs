@@ -4,7 +4,7 @@
 //! The person does not follow it, so e has power at low frequencies to which u does not respond; the estimated gain is
 //! then too low and its error bars are too small. The least-squares line and the cosines `cos(pi k (t + 1/2)/N)`,
 //! `k = 1 .. 2 T/`[`SLOW_PERIOD_S`] (all components slower than that period) are removed from both channels by the same
-//! linear operation, so the dynamics from e to u are preserved. A second fit lacks the information of low frequencies.
+//! linear operation, so the dynamics from e to u are preserved. A second fit lacks the information at low frequencies.
 //! If nothing is wrong, it differs from the first fit by chance with the variance `var' - var` (J. A. Hausman,
 //! *Econometrica* 46 (1978) 1251-1271); if it differs by more, slow components dominate the first fit.
 

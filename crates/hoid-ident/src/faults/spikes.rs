@@ -40,11 +40,11 @@ use super::{
     robust::{level_and_deviation, median, quantisation_step},
 };
 
-/// Square root of the minimum reduction of S.
+/// Square root of the minimum reduction in S.
 const ROOT_OF_MIN_REDUCTION: f64 = 8.0;
 /// Square root of the minimum advantage of faults over pushes in S.
 const ROOT_OF_MIN_ADVANTAGE: f64 = 5.0;
-/// Minimum advantage of faults over pushes, as a share of the reduction of S by interpolation.
+/// Minimum advantage of faults over pushes, as a share of the reduction in S by interpolation.
 const MIN_ADVANTAGE_SHARE: f64 = 0.2;
 /// Minimum ratio of the sum that pushes leave to the sum that faults (or noise alone) leave. It applies if the
 /// advantage of faults is less than the share [`MIN_ADVANTAGE_SHARE`].
@@ -53,7 +53,7 @@ const MIN_SUM_RATIO: f64 = 20.0;
 const MAX_INNOVATION: f64 = 5.0;
 /// Innovation at which a search for a fault starts, as a multiple of sigma.
 const START_INNOVATION: f64 = 4.0;
-/// Minimum change of a faulty sample by interpolation, relative to the deviation of the channel.
+/// Minimum change in a faulty sample by interpolation, relative to the deviation of the channel.
 const MIN_CHANGE: f64 = 1.5;
 /// Deviation that no person reaches within a few samples, in robust deviations of the channel.
 const IMPOSSIBLE_DEVIATION: f64 = 20.0;
@@ -65,7 +65,7 @@ pub(super) struct Spike {
     pub samples: Range<usize>,
     /// Largest deviation of the samples from their interpolation, with its sign.
     pub size: f64,
-    /// Square root of the reduction of S by interpolation.
+    /// Square root of the reduction in S by interpolation.
     pub deviations: f64,
 }
 

@@ -12,8 +12,8 @@ use super::{
 };
 use crate::{IdentError, informative_data::common_sample_time};
 
-/// Amplitude of a line, relative to the root sum of squares of all coefficients of its channel, up to which it is only
-/// rounding.
+/// Amplitude of a line, relative to the root sum of squares of all coefficients of its channel, up to which it counts
+/// as a rounding error.
 const MIN_LINE_AMPLITUDE: f64 = 1e-12;
 
 /// Number of bins at non-excited frequencies from which the remnant at a line is estimated.
@@ -73,9 +73,9 @@ impl Line {
         self.ratio.value(Some(run))
     }
 
-    /// Returns centre and radius of the circle in the complex plane that contains the true H with this probability. The
-    /// result is exact for a circular normal remnant, even if e is small compared with the remnant. `None` for one run,
-    /// or if the denominator of H does not differ from zero at this level.
+    /// Returns the centre and radius of the circle in the complex plane that contains the true H with this probability.
+    /// The result is exact for a circular normal remnant, even if e is small compared with the remnant. `None` for one
+    /// run, or if the denominator of H does not differ from zero at this level.
     pub fn confidence_circle(&self, probability: f64) -> Option<(Complex64, f64)> {
         self.ratio.confidence_disc(probability)
     }
@@ -323,8 +323,8 @@ fn line(runs: &[Run], harmonic: usize, omega_rad_s: f64, options: &DescribingOpt
     let (mut cross, mut power_u, mut power_d) = (Complex64::new(0.0, 0.0), 0.0, 0.0);
     for run in runs {
         let (e, u) = (at(run, &run.e), at(run, &run.u));
-        // Weight of the run in numerator and denominator: D*, or 1, or for the mean of ratios the inverse of the
-        // denominator.
+        // Weight of the run in the numerator and the denominator: D*, or 1, or for the mean of ratios the inverse of
+        // the denominator.
         let (weight, element_weight, d) = match (&options.averaging, &run.reference) {
             (Averaging::Reference { .. }, Some(reference)) => {
                 let d = at(run, reference);

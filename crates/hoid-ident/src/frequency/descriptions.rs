@@ -121,7 +121,7 @@ fn single_run_is_doubtful() {
         (VerdictLevel::Doubtful, vec!["few-runs"])
     );
     assert!(found.phases_deg().iter().all(|p| p.standard_error.is_none()));
-    // Four periods of one run, with little noise.
+    // The record contains four periods of one run, with little noise.
     let rough = noise(3, 4 * PERIOD_SAMPLES);
     let one = record(4 * PERIOD_SAMPLES, excitation, |k| 2.0 * excitation(k) + 0.1 * rough[k]);
     let found = describe_runs(std::slice::from_ref(&one), &DescriptionOptions::default()).unwrap();
@@ -147,8 +147,8 @@ fn single_run_is_doubtful() {
 #[test]
 fn unrelated_runs_are_not_determined() {
     let options = DescriptionOptions::default();
-    // By chance 1 in 20 sets of unrelated runs is not reported as unrelated; for 400 sets of two periods the standard
-    // error is 0.011.
+    // By chance, one in 20 sets of unrelated runs is not reported as unrelated; for 400 sets the standard error of this
+    // share is 0.011.
     let mut followed = 0;
     for stream in 0..400 {
         let u = noise(stream, 2 * PERIOD_SAMPLES);
@@ -211,7 +211,7 @@ fn crossover_outside_the_measured_lines_is_doubtful() {
 fn faults_of_the_excitation_are_reported() {
     let rough = noise(7, 4 * PERIOD_SAMPLES);
     let of = |samples| record(samples, excitation, |k| 2.0 * excitation(k) + 0.1 * rough[k]);
-    // A measured disturbance with noise: its share of the power is 0.0025 of 2.5025.
+    // The measured disturbance contains noise, whose share of its power is 0.0025 of 2.5025.
     let measured = Channel::new(
         "w",
         "",

@@ -142,7 +142,7 @@ fn coherence_finding(found: &DiagnosticInputs<'_>) -> Option<Finding> {
         return Some(Finding::undetermined(
             "unrelated",
             format!(
-                "u does not follow the excitation: {n} unrelated runs would have coherences like these with a \
+                "u does not follow the excitation: {n} unrelated runs would have coherences at least as large with a \
                  probability of {by_chance:.2}"
             ),
         ));

@@ -88,7 +88,7 @@ struct Solution {
 }
 
 impl DescribingFunction {
-    /// Fits gain, lead and delay by weighted least squares.
+    /// Fits the gain, the lead and the delay by weighted least squares.
     ///
     /// # Errors
     /// [`IdentError::BadOption`] for an invalid range of delays, for variance weights with one run, or if there are too

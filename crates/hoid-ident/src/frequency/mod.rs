@@ -1,23 +1,23 @@
 //! Describing functions: the response of a human operator at the lines of a periodic excitation, without a model.
 //!
 //! Let `E_i, U_i` be the Fourier coefficients of e and u at a line in run i. `H_i = U_i/E_i` is the describing function
-//! of that run. The remnant n, `U = H E + N`, is fed back through the loop, so the mean of the ratios is biased; the
+//! of that run. The remnant N in `U = H E + N` is fed back through the loop, so the mean of the ratios is biased; the
 //! bias increases as E decreases. Let D_i be the coefficient of the forcing function or the disturbance, which is not
 //! related to the remnant. The estimate
 //!
 //! `H = sum_i U_i D_i* / sum_i E_i D_i*`
 //!
-//! has a bias only in the second order of the error of its denominator. [`Averaging`] offers the mean of the ratios and
-//! this estimate, as well as `D_i = 1` for runs that all had the same excitation.
+//! has a bias that is only of second order in the error of its denominator. [`Averaging`] offers the mean of the ratios
+//! and this estimate, as well as `D_i = 1` for runs that all had the same excitation.
 //!
 //! - **Standard error**: with `N_i = U_i - H E_i`, `sigma^2 = n/(n-1) sum |N_i D_i*|^2 / |sum E_i D_i*|^2` estimates
-//!   the expectation of `|dH|^2`. The coefficients of a stationary remnant are circular: real and imaginary part each
-//!   have half of the variance. Therefore `20 log10 |H|` has the standard error `(20/ln 10) sigma/(sqrt(2) |H|)`, and
-//!   the phase has the standard error `sigma/(sqrt(2) |H|)` rad. This is valid if the remnant in e is small compared
-//!   with e; [`Line::confidence_circle`] is valid for any remnant.
+//!   the expectation of `|dH|^2`. The coefficients of a stationary remnant are circular: the real and imaginary parts
+//!   each have half of the variance. Therefore `20 log10 |H|` has the standard error `(20/ln 10) sigma/(sqrt(2) |H|)`,
+//!   and the phase has the standard error `sigma/(sqrt(2) |H|)` rad. This is valid if the remnant in e is small
+//!   compared with e; [`Line::confidence_circle`] is valid for any remnant.
 //! - **Coherence** between excitation and u over runs: `|sum U_i D_i*|^2 / (sum |U_i|^2 sum |D_i|^2)`. Its expectation
 //!   for n unrelated runs is 1/n.
-//! - **Remnant**: the part of u at non-excited frequencies, i.e. the remnant after the closed loop, `N/(1 + L)`.
+//! - **Remnant**: the part of u at non-excited frequencies, i.e. the remnant as shaped by the closed loop, `N/(1 + L)`.
 //!
 //! Sources: D. T. McRuer and H. R. Jex, IEEE Trans. Human Factors in Electronics 8 (1967) 231-249;
 //! M. M. van Paassen and M. Mulder, *Identification of Human Operator Control Behaviour in

@@ -113,7 +113,7 @@ impl DescribingFunction {
 }
 
 impl OpenLoop {
-    /// Returns crossover frequency, phase margin and gain margin.
+    /// Returns the crossover frequency, the phase margin and the gain margin.
     pub fn margins(&self) -> DescribingMargins {
         self.margins_with_delay(0.0)
     }
@@ -229,7 +229,7 @@ mod tests {
 
     #[test]
     fn crossover_of_a_log_linear_response_is_exact() {
-        // k/s with a phase that is linear over log omega, for which the interpolation is exact.
+        // The magnitude is that of k/s, and the phase is linear over log omega, so the interpolation is exact.
         let omega: [f64; 4] = [0.3, 1.0, 4.0, 11.0];
         let phase = |w: f64| -100.0 - 30.0 * w.ln();
         let response: Vec<Complex64> = omega
@@ -239,7 +239,7 @@ mod tests {
         let found = Crossover::of(&omega, &response, 0.0).unwrap();
         assert!((found.omega_rad_s - 2.5).abs() < 1e-12);
         assert!((found.phase_margin_deg - (180.0 + phase(2.5))).abs() < 1e-10);
-        // Rotated about the origin across the negative axis.
+        // The response is rotated about the origin across the negative axis.
         let turned: Vec<Complex64> = response.iter().map(|l| l * Complex64::from_polar(1.0, -1.2)).collect();
         let found = Crossover::of(&omega, &turned, 0.0).unwrap();
         assert!((found.phase_margin_deg - (180.0 + phase(2.5) - 1.2_f64.to_degrees())).abs() < 1e-10);
@@ -261,7 +261,7 @@ mod tests {
 
     #[test]
     fn gain_margin_is_taken_where_the_phase_falls_below_minus_180() {
-        // 4/s with a delay of 0.3 s: -180 deg at pi/0.6, where the gain is 4 * 0.6/pi.
+        // For 4/s with a delay of 0.3 s the phase is -180 deg at pi/0.6, where the gain is 4 * 0.6/pi.
         let omega = [0.7, 3.0, 9.0, 14.0];
         let response: Vec<Complex64> = omega
             .iter()

@@ -2,12 +2,13 @@
 //!
 //! To first order `dH = sum (a_i - H b_i) / sum b_i` with independent terms, so the variance is
 //! `sigma^2 = n/(n-1) sum |a_i - H b_i|^2 / |sum b_i|^2`. A region without linearisation follows from the mean of
-//! `a_i - H b_i`, which has the expectation zero only at the true H: n times its square over the sample variance has
-//! the F distribution with 2 and 2(n - 1) degrees of freedom for circular normal errors. The values of H that F does
-//! not exclude at a given level form a disc if the denominator differs from zero at this level (E. C. Fieller, J. Royal
-//! Statistical Society B 16 (1954) 175-185, for complex ratios). The standard error of a quantity computed from several
-//! ratios comes from the jackknife over runs, `sigma^2 = (n-1)/n sum (y_(i) - mean)^2`, where y_(i) is the value
-//! without run i (B. Efron, *The Jackknife, the Bootstrap and Other Resampling Plans*, 1982, chapter 3).
+//! `a_i - H b_i`, which has the expectation zero only at the true H: n times its squared modulus over the sample
+//! variance has the F distribution with 2 and 2(n - 1) degrees of freedom for circular normal errors. The values of H
+//! that F does not exclude at a given level form a disc if the denominator differs from zero at this level (E. C.
+//! Fieller, J. Royal Statistical Society B 16 (1954) 175-185, for complex ratios). The standard error of a quantity
+//! computed from several ratios comes from the jackknife over runs, `sigma^2 = (n-1)/n sum (y_(i) - mean)^2`, where
+//! y_(i) is the value without run i (B. Efron, *The Jackknife, the Bootstrap and Other Resampling Plans*, 1982, chapter
+//! 3).
 
 use hoid_model::{Complex64, uncertainty::Estimate};
 use hoid_numerics::statistics::{self, sample_variance, sum_of_squared_deviations};
@@ -43,8 +44,8 @@ impl Ratio {
         (n > 1.0).then(|| (n / (n - 1.0) * squares).sqrt() / b.norm())
     }
 
-    /// Returns centre and radius of the disc that contains the true ratio with this probability; `None` for one run, or
-    /// if the region is unbounded.
+    /// Returns the centre and radius of the disc that contains the true ratio with this probability; `None` for one
+    /// run, or if the region is unbounded.
     pub fn confidence_disc(&self, probability: f64) -> Option<(Complex64, f64)> {
         let n = self.0.len() as f64;
         let (a, b) = self.numerator_and_denominator(None);
@@ -110,7 +111,7 @@ mod tests {
         assert!((ratio.value(None) - Complex64::new(0.0, expected.value)).norm() < 1e-15);
         let error = expected.standard_error.unwrap();
         assert!((ratio.standard_error().unwrap() - error).abs() < 1e-15);
-        // The jackknife of a mean is the classical formula.
+        // For a mean, the jackknife equals the classical formula.
         let without: Vec<Option<f64>> = (0..4).map(|i| Some(ratio.value(Some(i)).im)).collect();
         assert!((jackknife(expected.value, &without).standard_error.unwrap() - error).abs() < 1e-15);
         assert_eq!(jackknife(1.0, &[Some(1.0), None]).standard_error, None);

@@ -154,7 +154,7 @@ fn confidence_circles_have_nominal_coverage() {
     }
     let unbounded: usize = without_bound.iter().sum();
     let checks = experiments as usize * squares.len();
-    // An unbounded region is the outside of a circle far from H, so the true value is in it.
+    // An unbounded region is the exterior of a circle far from H, so the true value is counted as inside.
     let coverage = (inside + unbounded) as f64 / checks as f64;
     println!("coverage {coverage} of {checks} circles, without bound {without_bound:?}");
     // The checks are nearly independent, with a standard error of 0.0077. The region may be unbounded only where the
@@ -174,8 +174,8 @@ fn confidence_circles_have_nominal_coverage() {
     let mean = crossovers.iter().sum::<f64>() / n;
     let variance = crossovers.iter().map(|c| (c - mean).powi(2)).sum::<f64>() / (n - 1.0);
     let ratio = (variance / (errors.iter().sum::<f64>() / n)).sqrt();
-    // With 80 experiments the standard deviation has a relative standard error of 0.08, and the jackknife of five runs
-    // one of 0.04.
+    // With 80 experiments the standard deviation has a relative standard error of 0.08, and the mean of the jackknife
+    // variances of five runs contributes 0.04.
     println!("crossover {mean}, deviation/standard error {ratio}");
     assert!((ratio - 1.0).abs() < 0.27);
 }

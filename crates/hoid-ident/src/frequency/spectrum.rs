@@ -54,7 +54,7 @@ mod tests {
                     7 => expected,
                     _ => Complex64::new(0.0, 0.0),
                 };
-                // Rounding error of about ten successive additions.
+                // The tolerance allows for the rounding error of about ten successive additions.
                 assert!((c - expected).norm() < 1e-13, "{n} {k}: {c}");
             }
         }

@@ -37,7 +37,7 @@ mod tests {
 
     #[test]
     fn unwrapped_phase_of_a_delay_is_linear() {
-        // A delay of 0.9 s and steps of 1 rad/s: 52 deg per step, and many turns in total.
+        // With a delay of 0.9 s and steps of 1 rad/s, the phase changes by 52 deg per step, and by many turns in total.
         let phases: Vec<(f64, f64)> = (1..200)
             .map(|k| {
                 let omega = f64::from(k);

@@ -20,7 +20,7 @@ use crate::{
     progress,
 };
 
-/// Limits of a search while orders are compared: relative decrease of the loss, and number of steps.
+/// Limits of a search while orders are compared: relative decrease in the loss, and number of steps.
 const QUICK_TOLERANCE: f64 = 1e-7;
 const QUICK_ITERATIONS: usize = 30;
 

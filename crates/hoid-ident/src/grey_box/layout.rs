@@ -28,7 +28,7 @@ pub(crate) const TIME_CONSTANT_SLOT: usize = 5;
 /// Names of the parameters that can be constrained or estimated individually for each record.
 pub const GREY_BOX_PARAMETER_NAMES: [&str; 7] = ["K_e", "K_e_dot", "T_L", "omega_nm", "zeta_nm", "tau_e", "T_n"];
 
-/// Bounds of zeta_nm. Beyond the bounds the two poles are effectively independent.
+/// Bounds of zeta_nm: almost no damping at the lower bound, two effectively independent poles at the upper bound.
 const ZETA_LIMITS: (f64, f64) = (1e-4, 20.0);
 /// Bounds of T_n in samples: below the lower bound the remnant is white noise, above the upper bound it is a drift.
 const TIME_CONSTANT_LIMITS: (f64, f64) = (0.1, 1e4);
@@ -404,7 +404,7 @@ mod tests {
                     let scale = exact.jacobian.iter().map(|r| r[j].abs()).fold(0.0, f64::max);
                     for i in 0..up.len() {
                         let difference = (up[i] - down[i]) / (2.0 * h);
-                        // Truncation error h^2 and rounding error eps/h.
+                        // The difference has a truncation error of order h^2 and a rounding error of eps/h.
                         assert!(
                             (exact.jacobian[i][j] - difference).abs() < 1e-7 * scale,
                             "m {order} {constraint} row {i} column {j}: {} and {difference}",

@@ -5,8 +5,8 @@
 //! its zeros ([`hoid_model::remnant_noise`]). The predictor is the predictor of `u = (B/F) q^-nk e + (C/D) eps` with
 //! the polynomials `theta(eta)`. The criterion is the same as for the general model, so initial states are eliminated
 //! exactly, and `psi_eta = psi d theta/d eta`. A Box-Jenkins model with nc = 0 has a free D of order m; the grey box
-//! has only T_n, and neither D nor nk has to compensate for missing structure: T_n, K_n and tau_e are consistent. K_n
-//! follows from the innovation: `K_n = sigma/g(T_n)`.
+//! has only T_n, and neither D nor nk has to compensate for missing structure, so T_n, K_n and tau_e are estimated
+//! consistently. K_n follows from the standard deviation sigma of the innovations: `K_n = sigma/g(T_n)`.
 //!
 //! The order m is given or chosen by BIC from a range. All orders m >= 1 have the same number of parameters, so the
 //! loss decides between these orders.
@@ -16,7 +16,7 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | `options` | [`GreyBox`]: options as fields, and their names in texts |
+//! | `options` | [`GreyBox`]: options as fields, and their names in text input |
 //! | `estimator` | fit of each order, and choice of the order |
 //! | `layout` | positions and bounds of the physical parameters |
 //! | `parametrisation` | interface between the criterion and the physical parameters |

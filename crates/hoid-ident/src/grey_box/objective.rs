@@ -453,7 +453,8 @@ mod tests {
                     };
                     let difference = -(value(1.0) - value(-1.0)) / (4.0 * h);
                     let scale = (at.gram[i * eta.len() + i] * at.sum_of_squares).sqrt();
-                    // Truncation error h^2 and rounding error 1e-16/1e-5, relative to the scale of the gradient.
+                    // The difference has a truncation error of order h^2 and a rounding error of 1e-16/1e-5, relative
+                    // to the scale of the gradient.
                     assert!(
                         (at.descent[i] - difference).abs() < 1e-7 * scale,
                         "m {order} {initial:?} {}: {} and {difference}",
@@ -479,7 +480,7 @@ mod tests {
                 .sum_of_squares
         };
         let (before, there, after) = (loss(0.3 - 1e-9), loss(0.3), loss(0.3 + 1e-9));
-        // 1e-9 s times a relative slope of about 10/s.
+        // The relative change in the loss is 1e-9 s times a slope of about 10/s.
         assert!(
             (before / there - 1.0).abs() < 1e-7 && (after / there - 1.0).abs() < 1e-7,
             "{before} {there} {after}"

@@ -1,5 +1,5 @@
-//! Options of the operator with a remnant of order m: the fields of [`GreyBox`], and the names under which texts set
-//! them. Each option is declared only in this file.
+//! Options of the operator with a remnant of order m: the fields of [`GreyBox`], and the names under which text input
+//! sets them. Each option is declared only in this file.
 
 use std::{collections::BTreeMap, ops::RangeInclusive};
 

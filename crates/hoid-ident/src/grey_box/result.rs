@@ -147,7 +147,7 @@ impl GreyBoxFit {
     /// Returns T_n and K_n of a record, with a remnant that is held over each sample; `None` for m = 0, where the
     /// remnant is white with the standard deviation of the innovation.
     ///
-    /// `K_n = sigma/g(T_n)`; sigma has the variance `sigma^2/(2 n)` and is uncorrelated with T_n (Gaussian
+    /// `K_n = sigma/g(T_n)`; sigma has the variance `sigma^2/(2 n)` and is uncorrelated with T_n (for Gaussian
     /// innovations).
     pub fn remnant(&self, record: usize) -> Option<RemnantEstimate> {
         if self.layout.order == 0 {

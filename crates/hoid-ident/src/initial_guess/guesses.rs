@@ -10,8 +10,8 @@
 //!    zero-order hold.
 //! 3. `steiglitz-mcbride`: ARX fits to input and output filtered by 1/F of the previous step, repeated a few times (K.
 //!    Steiglitz and L. E. McBride, *IEEE Trans. Automatic Control* 10 (1965) 461-464). The `arx` poles themselves are
-//!    strongly biased if the noise poles differ from the system poles (m0 = 1: a2 near 0); they are used only if the
-//!    iteration fails.
+//!    strongly biased if the noise poles differ from the system poles (with a first-order remnant filter, a2 is
+//!    estimated near 0); they are used only if the iteration fails.
 //! 4. `high-order arx`: an ARX model with additional poles for the noise; F is fitted to its noise-free response by the
 //!    Steiglitz-McBride iteration (B. Wahlberg, *Automatica* 25 (1989) 829-841, in its simplest form).
 //! 5. `instruments`: ARX, two estimates with instrumental variables, and C and D from the residual ([`crate::iv`]).

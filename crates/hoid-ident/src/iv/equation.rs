@@ -240,8 +240,8 @@ impl<'a> IvProblem<'a> {
     }
 
     /// Returns the prediction error `eps = (D/C) (u - (B/F) q^-nk e)` of a system with stable F, with 1/(C F) at rest
-    /// at the first row, and its negative gradient psi for F and B. `filter` is `D/(C F)` with the same F. From
-    /// `F C eps = D (F u - B q^-nk e)` follow `psi_fi = -(D/(C F)) u(t-i) + (1/F) eps(t-i)` and
+    /// at the first row, and its negative gradient psi for F and B. `filter` is `D/(C F)` with the same F. The equation
+    /// `F C eps = D (F u - B q^-nk e)` gives `psi_fi = -(D/(C F)) u(t-i) + (1/F) eps(t-i)` and
     /// `psi_bj = (D/(C F)) e(t-nk-j)`.
     pub fn prediction_error(&self, filter: Prefilter<'_>, system: &[f64]) -> (Vec<f64>, Columns) {
         let measured: Vec<(&[f64], &[f64])> = self.data.iter().map(|d| (d.u, d.e)).collect();

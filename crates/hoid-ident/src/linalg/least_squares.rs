@@ -201,8 +201,8 @@ pub(crate) fn solve_symmetric(gram: &[f64], rhs: &[f64]) -> Option<Vec<f64>> {
     Some(y.iter().zip(&scale).map(|(v, s)| v / s).collect())
 }
 
-/// Returns the inverse of a p x p information matrix (by rows) for the free parameters; the rows and columns of all other
-/// parameters are zero. `None` if the matrix of the free parameters is not positive definite.
+/// Returns the inverse of a p x p information matrix (by rows) for the free parameters; the rows and columns of all
+/// other parameters are zero. `None` if the matrix of the free parameters is not positive definite.
 pub(crate) fn covariance_of_free(information: &[f64], free: &[usize], p: usize) -> Option<Vec<f64>> {
     let part: Vec<f64> = (free.iter())
         .flat_map(|&i| free.iter().map(move |&j| information[i * p + j]))

@@ -15,5 +15,5 @@ pub(crate) fn lies_in_basin(minimum: &Minimum, start: &[f64], sum_of_squares: f6
     rise <= MAX_LOSS_INCREASE * minimum.linearisation.sum_of_squares && (found - rise).abs() <= 0.1 * rise
 }
 
-/// Largest relative increase of the loss at which a start is compared with the quadratic model.
+/// Largest relative increase in the loss at which a start is compared with the quadratic model.
 const MAX_LOSS_INCREASE: f64 = 0.05;

@@ -9,10 +9,10 @@ use super::{
 use crate::criterion::Workspace;
 use crate::linalg::{least_squares::solve_symmetric, vectors::dot};
 
-/// Predicted relative decrease of the loss below which the second derivative is estimated from the gradients.
+/// Predicted relative decrease in the loss below which the second derivative is estimated from the gradients.
 const SECANT_DECREASE_LIMIT: f64 = 1e-2;
 
-/// Relative decrease of the loss that may be hidden by rounding: filters with poles near the unit circle lose five of
+/// Relative decrease in the loss that may be hidden by rounding: filters with poles near the unit circle lose five of
 /// the sixteen digits.
 const ROUNDING_DECREASE: f64 = 1e-10;
 
@@ -27,7 +27,7 @@ pub(crate) struct GaussNewton<'s> {
     pub(super) iterations: usize,
     mu: f64,
     growth: f64,
-    /// Decrease of the sum of squares that the quadratic model predicts for the undamped step.
+    /// Decrease in the sum of squares that the quadratic model predicts for the undamped step.
     predicted_decrease: f64,
     /// Half the second derivative of the sum of squares minus the Gauss-Newton matrix, estimated from the gradients of
     /// the last steps; empty if it is not used.
@@ -297,7 +297,7 @@ impl<'s> GaussNewton<'s> {
         self.objective.is_feasible(&self.evaluation_point)
     }
 
-    /// Returns the step `(H + S + mu diag H)^-1 g` of the free parameters, cut at the bounds, and the decrease of the
+    /// Returns the step `(H + S + mu diag H)^-1 g` of the free parameters, cut at the bounds, and the decrease in the
     /// sum of squares that the quadratic model predicts. `None` if the matrix is not positive definite.
     fn damped_step(&self, mu: f64, secant: &[f64]) -> Option<Step> {
         let p = self.theta.len();

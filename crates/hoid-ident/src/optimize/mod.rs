@@ -22,7 +22,7 @@
 //! bound if the loss decreases beyond it (an active set method; J. Nocedal and S. J. Wright, *Numerical Optimization*,
 //! 2006, section 16.5).
 //!
-//! The search has converged when the undamped Gauss-Newton step of the free parameters predicts a relative decrease of
+//! The search has converged when the undamped Gauss-Newton step of the free parameters predicts a relative decrease in
 //! the loss of less than `tolerance`: `g' H^-1 g <= tolerance V`. The remaining distance is about `sqrt(tolerance N)`
 //! standard errors, which is 1e-4 for the default tolerance and 8192 samples; this last step is still taken. The search
 //! has also converged if no step decreases the loss and the predicted decrease is no larger than the rounding error of

@@ -195,7 +195,7 @@ mod tests {
                 assert!((a - b).abs() < 1e-12, "{p:?}");
             }
         }
-        // By hand: k2 = f2, k1 = f1/(1 + f2).
+        // Computed by hand: k2 = f2, k1 = f1/(1 + f2).
         let k = reflection_coefficients(&[-1.5, 0.7]).unwrap();
         assert!((k[0] + 1.5 / 1.7).abs() < 1e-15 && k[1] == 0.7);
         for unstable in [vec![1.0], vec![-2.1, 1.2], vec![0.0, -1.0], vec![f64::NAN]] {

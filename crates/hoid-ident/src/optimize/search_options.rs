@@ -25,7 +25,7 @@ pub struct SearchOptions {
     pub method: SearchMethod,
     /// Largest number of steps from each start. Default 100.
     pub max_iterations: usize,
-    /// Predicted relative decrease of the loss below which the search has converged. Default 1e-12.
+    /// Predicted relative decrease in the loss below which the search has converged. Default 1e-12.
     pub tolerance: f64,
 }
 

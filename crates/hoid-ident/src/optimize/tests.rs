@@ -92,7 +92,7 @@ impl Objective for Valley {
     fn linearise(&self, theta: &[f64], _: &mut Workspace) -> Linearisation {
         let (x, y) = (theta[0], theta[1]);
         let eps = [10.0 * (y - x * x), 1.0 - x];
-        // Negative derivatives by rows of eps.
+        // Negative derivatives, one row for each element of eps.
         let psi = [[20.0 * x, -10.0], [1.0, 0.0]];
         let product = |i: usize, j: usize| psi[0][i] * psi[0][j] + psi[1][i] * psi[1][j];
         Linearisation {
@@ -132,7 +132,7 @@ fn every_method_descends_the_valley() {
         assert!(end.termination.converged(), "{method:?}");
         assert!(end.theta.iter().all(|t| (t - 1.0).abs() < 1e-8), "{method:?}");
     }
-    // Steepest descent is slow in a valley, and goes down.
+    // Steepest descent is slow in a valley, but the loss decreases.
     let slow = descend(&open, SearchMethod::SteepestDescent, 2000);
     assert!(
         slow.linearisation.sum_of_squares < 0.1,
@@ -162,7 +162,7 @@ fn limits_and_fixed_parameters_are_respected() {
     };
     let end = descend(&fixed, SearchMethod::Automatic, 200);
     assert_eq!(end.theta[1], 4.0);
-    // Stationary in x with y = 4: 200 x (x^2 - 4) = 1 - x, on the same side as the start.
+    // The loss is stationary in x for y = 4 if 200 x (x^2 - 4) = 1 - x; this root is on the same side as the start.
     assert!((end.theta[0] + 1.99812).abs() < 1e-4, "{}", end.theta[0]);
     let slope = end.linearisation.descent[0] / end.linearisation.gram[0].sqrt();
     assert!(slope.abs() < 1e-6);
@@ -206,7 +206,7 @@ fn unstable_starts_and_the_iteration_limit_are_reported() {
 #[test]
 fn secant_saves_steps_for_a_wrong_model() {
     let (e, u) = signals(3000, 0.4);
-    // One pole instead of the two that are needed, and white noise instead of coloured noise.
+    // The model has one pole instead of the two that are needed, and white noise instead of coloured noise.
     let orders = Orders {
         nb: 2,
         nf: 1,

@@ -3,7 +3,7 @@
 //!
 //! The starts cover the whole region of stability ([`crate::initial_guess::broad_starts`]). A few search steps from
 //! each start show which starts decrease the loss. The best searches are completed, unless they come close to the known
-//! minimum without a predicted lower end. If nothing lower is found, the known result remains bitwise unchanged.
+//! minimum and are not predicted to end lower. If nothing lower is found, the known result remains bitwise unchanged.
 //!
 //! **Conditions.** Records of some hundred samples have many minima. A model with more coefficients than the operator
 //! (nb, nf > 2, nc > 0, nd > 4) has many minima for longer records too; in this case the first few steps use only a
@@ -31,7 +31,7 @@ const MAX_COMPLETED_SEARCHES: usize = 8;
 /// Values that replace [`RANKED_START_COUNT`] and [`MAX_COMPLETED_SEARCHES`] for a record longer than
 /// [`MAX_SPAN_RESIDUALS`].
 const COUNTS_FOR_LONG_RECORD: [usize; 2] = [12, 3];
-/// Minimum relative decrease of the loss for which a minimum counts as lower.
+/// Minimum relative decrease in the loss for which a minimum counts as lower.
 const MIN_DECREASE: f64 = 1e-7;
 
 /// Returns a lower minimum with the label of its start, if one is found. No search is made if the start was given, if

@@ -11,8 +11,8 @@
 //! so theta becomes biased (F. R. Hampel, E. M. Ronchetti, P. J. Rousseeuw and W. A. Stahel, *Robust Statistics*, 1986,
 //! section 6.3: the influence is the product of the influence of the residual and the influence of position). To bound
 //! the influence of position as well, the estimator first limits each sample of e and u by its neighbours
-//! ([`crate::faults::limited_record`]); in a normal channel one sample in 16 000 is changed, so the efficiency of the
-//! loss is retained.
+//! ([`crate::faults::limited_record`]); in a normally distributed channel one sample in 16 000 is changed, so the
+//! efficiency of the loss is retained.
 //!
 //! The covariance is `s^2 kappa (psi' psi)^-1`, `kappa = mean(rho'^2) / mean(rho'')^2`, with the unweighted psi (Huber,
 //! eq. 7.6.8, for residuals that are independent of the gradient).
@@ -261,7 +261,7 @@ mod tests {
 
     #[test]
     fn clean_records_lose_five_per_cent_of_efficiency() {
-        // The squares are efficient, so var(robust) = var(squares) + var(difference) (J. A. Hausman, Econometrica 46
+        // Least squares is efficient, so var(robust) = var(squares) + var(difference) (J. A. Hausman, Econometrica 46
         // (1978) 1251-1271).
         let (mut squares, mut count) = (0.0, 0.0);
         for replication in 10..26 {

@@ -34,7 +34,7 @@ impl<E: 'static, X: 'static> BatchOption<E, X> {
         }
     }
 
-    /// Returns the option so that it is also printed among the settings in use, under this name.
+    /// Returns the option, which is then also printed under this name among the settings in use.
     #[must_use]
     pub fn with_formatter(
         self,

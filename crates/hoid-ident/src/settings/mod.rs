@@ -21,7 +21,7 @@
 //! assert_eq!(options.refit, 50);
 //! assert_eq!(options.list()[0].help, "Samples between fits");
 //! assert!(options.set("refit", "0").is_err());
-//! // A name that is not among them is nobody's.
+//! // `set` returns false for an unknown name.
 //! assert!(!options.set("memory", "256")?);
 //! # Ok::<(), hoid_ident::IdentError>(())
 //! ```

@@ -48,7 +48,8 @@ fn box_jenkins() -> SeveralInputs {
 
 #[test]
 fn two_systems_and_their_noise_model_are_found() {
-    // 40 records: the mean square of the errors, in standard errors, is one to within 4 of its standard errors.
+    // For 40 records, the mean square of the errors, in standard errors, is one to within 0.1 plus four times its
+    // standard error.
     let truth = [0.5, 0.2, 0.4, -0.8, -0.7, 0.3, -0.9];
     let (mut squares, mut count) = (0.0, 0.0);
     for seed in 1..=40 {
@@ -171,7 +172,7 @@ fn invalid_inputs_and_orders_are_refused() {
     late.inputs[1].1.nk = 400;
     let needs = refusal(late);
     assert!(needs.contains("needs more than 401"), "{needs}");
-    // Enough samples for the coefficients of one input, but too few for those of two inputs.
+    // There are enough samples for the coefficients of one input, but too few for those of two inputs.
     let few = [record(14, 0.1, 1)];
     let too_few = box_jenkins().fit(&few);
     assert!(matches!(too_few, Err(IdentError::TooFewSamples { .. })), "{too_few:?}");

@@ -7,24 +7,24 @@ use hoid_model::{Form, SampleTime, operator_family::Coordinate};
 use super::layout::{Layout, ThetaElement};
 use crate::{Constraint, IdentError, family::coordinates};
 
-/// Bounds of zeta_nm. Beyond the bounds the two poles are effectively independent.
+/// Bounds of zeta_nm: almost no damping at the lower bound, two effectively independent poles at the upper bound.
 const ZETA_LIMITS: (f64, f64) = (1e-4, 100.0);
 /// Admissible range of T_I, s: a shorter lag is equivalent to no lag, a longer lag to an integration.
 const LAG_LIMITS_S: (f64, f64) = (1e-3, 1e6);
 /// Largest omega_nm as a share of pi/Ts.
 const MAX_NYQUIST_SHARE: f64 = 0.999;
-/// Share of the time span at each end in which t_M is not searched by default: so short a part of a record does not
+/// Share of the time span at each end in which t_M is not searched for by default: so short a part of a record does not
 /// determine two gains.
 const END_SHARE: f64 = 0.05;
-/// Largest default rate times the sample time: 10 to 90 % of the change take two samples (2 ln 9 = 4.4). A faster
-/// change cannot be distinguished from this one, and its likelihood would be a staircase in t_M with a step for each
-/// sample (at this rate the slope varies by 2 % with the position of t_M between two samples, at twice the rate by 50
-/// %).
+/// Largest default rate times the sample time: the change from 10 to 90 % takes about two samples (2 ln 9 = 4.4). A
+/// faster change cannot be distinguished from this one, and its likelihood would be a staircase in t_M with a step for
+/// each sample (at this rate the slope varies by 2 % with the position of t_M between two samples, at twice the rate by
+/// 50 %).
 pub(crate) const MAX_DEFAULT_RATE_TIMES_TS: f64 = 2.0;
 /// Largest admissible rate times the sample time.
 const MAX_RATE_TIMES_TS: f64 = 10.0;
-/// Smallest rate times the time span: 8 to 92 % of the change fill the span (2 ln 12 = 5.0), so the change can hardly
-/// be distinguished from a line.
+/// Smallest rate times the time span: the change from 8 to 92 % fills the span (2 ln 12 = 5.0), so the change can
+/// hardly be distinguished from a line.
 const MIN_RATE_TIMES_SPAN: f64 = 5.0;
 
 /// Quantities that determine the bounds.

@@ -105,8 +105,8 @@ impl SigmoidChange {
             let Some(theta) = walk.flatten() else {
                 return Ok(found);
             };
-            // Each of two minima may have the lower loss with the weights of the other. The decision is therefore by
-            // the likelihood, which includes the weights.
+            // Each of two minima may have the lower loss with the weights of the other. The decision is therefore based
+            // on the likelihood, which includes the weights.
             let weights = criterion.weights.clone();
             let other = search(&criterion, theta, &self.search, None).ok_or(IdentError::NoFiniteLoss)?;
             let penalty = criterion.penalty.clone();

@@ -20,8 +20,8 @@ pub struct ChangeParameter {
     pub unit: &'static str,
     /// Value and standard error.
     pub estimate: Estimate,
-    /// Reason why the parameter has no standard error, or one that does not come from the data; `None` for a normal
-    /// estimate.
+    /// Reason why the parameter has no standard error, or a standard error that does not come from the data; `None` for
+    /// a normal estimate.
     pub remark: Option<Remark>,
 }
 
@@ -338,8 +338,8 @@ impl SigmoidFit {
     /// Returns the unweighted one-step-ahead residuals of a record, with its initial state estimated.
     ///
     /// # Errors
-    /// [`IdentError::MixedSampling`] if the record has another sample time than the fit, [`IdentError::TooFewSamples`]
-    /// if the record is too short.
+    /// [`IdentError::MixedSampling`] if the sample time of the record differs from that of the fit,
+    /// [`IdentError::TooFewSamples`] if the record is too short.
     pub fn residuals(&self, record: &Record) -> Result<Series, IdentError> {
         self.residual_series(self.layout, &self.theta, record)
     }

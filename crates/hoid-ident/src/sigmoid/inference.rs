@@ -19,7 +19,7 @@ use crate::{
     optimize::{Linearisation, Minimum, free_parameters},
 };
 
-/// Reason why a parameter has no standard error, or one that does not come from the data.
+/// Reason why a parameter has no standard error, or a standard error that does not come from the data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[non_exhaustive]
 pub enum Remark {
@@ -29,8 +29,8 @@ pub enum Remark {
     AtBound,
     /// G is at its upper bound: the change takes no longer than two samples, and its rate cannot be determined.
     Abrupt,
-    /// The records show no change (BIC): t_M and G have no meaning, and the differences between the gains are due to
-    /// chance.
+    /// The BIC does not justify a change: t_M and G have no meaning, and the differences between the gains are not
+    /// significant.
     NoChange,
     /// The change is too fast for a normally distributed error of t_M: only its likelihood interval is valid.
     ChangePoint,
@@ -84,7 +84,8 @@ pub(super) struct Inference {
     pub innovation_variance: f64,
     /// Covariance of theta by rows; `None` for an exact fit.
     pub covariance: Option<Vec<f64>>,
-    /// Remark on each element of theta that has no standard error, or one that does not come from the data.
+    /// Remark on each element of theta that has no standard error, or a standard error that does not come from the
+    /// data.
     pub remarks: Vec<Option<Remark>>,
     pub comparison: Comparison,
     /// True if the change is too fast for a normally distributed error of t_M.

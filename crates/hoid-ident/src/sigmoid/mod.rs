@@ -21,7 +21,7 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | `options` | [`SigmoidChange`]: options as fields, and their names in texts |
+//! | `options` | [`SigmoidChange`]: options as fields, and their names in text input |
 //! | `estimator` | fit of the change |
 //! | `layout` | order and meaning of the parameters |
 //! | `bounds` | search ranges of the parameters |

@@ -89,7 +89,8 @@ pub(crate) fn weights(sigma: [f64; 2], shares: &[Vec<f64>]) -> Vec<Vec<f64>> {
 mod tests {
     use super::*;
 
-    /// Residuals with the variance of normal noise: equal shares of +1 and -1 have the mean square 1.
+    /// Returns residuals whose size equals the noise level at each time, with alternating signs, and the shares of the
+    /// change.
     fn record(sigma: [f64; 2]) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
         let shares: Vec<f64> = (0..400).map(|t| f64::from(t / 2) / 199.0).collect();
         let eps = shares

@@ -1,5 +1,5 @@
-//! Options of an operator that changes once: the fields of [`SigmoidChange`], and the names under which texts set them.
-//! Each option is declared only in this file.
+//! Options of an operator that changes once: the fields of [`SigmoidChange`], and the names under which text input sets
+//! them. Each option is declared only in this file.
 
 use std::collections::BTreeMap;
 

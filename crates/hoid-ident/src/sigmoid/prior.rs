@@ -1,8 +1,8 @@
 //! Prior knowledge about the person in the criterion of a change.
 //!
-//! A prior of a positive parameter x, `ln x ~ N(m, s)`, is added to the squared residuals as `sigma^2 (ln x - m)^2/s^2`
-//! ([`crate::family::OperatorPrior`]); the prior of T_L applies before and after the change. sigma^2 is the innovation
-//! variance of the fit; fit and sigma^2 are computed alternately.
+//! A prior of a positive parameter x, `ln x ~ N(m, s^2)`, is added to the squared residuals as
+//! `sigma^2 (ln x - m)^2/s^2` ([`crate::family::OperatorPrior`]); the prior of T_L applies before and after the change.
+//! sigma^2 is the innovation variance of the fit; the fit and sigma^2 are computed alternately.
 
 use super::{
     layout::{Layout, ThetaElement},
@@ -19,7 +19,7 @@ use crate::{
 
 /// Largest number of rounds in which sigma^2 of the prior is updated.
 const MAX_ROUNDS: usize = 3;
-/// Relative change of sigma^2 below which no further round is necessary.
+/// Relative change in sigma^2 below which no further round is necessary.
 const CONVERGENCE_TOLERANCE: f64 = 0.05;
 
 /// Returns the penalties of all elements of theta that have a prior, for the innovation variance 1.

@@ -68,7 +68,7 @@ pub(crate) fn profile_likelihood_interval(
     let options = SearchOptions {
         method: SearchMethod::LevenbergMarquardt,
         max_iterations: 30,
-        // The statistic is n times the relative change of the loss, so it is accurate to a thousandth of the quantile.
+        // The statistic is n times the relative change in the loss, so it is accurate to a thousandth of the quantile.
         tolerance: 1e-3 * quantile / n,
     };
     let (low, high) = criterion.limits[place];
@@ -98,8 +98,8 @@ pub(crate) fn profile_likelihood_interval(
             let value = (from[place] + sign * step).clamp(low, high);
             step *= STEP_GROWTH;
             let Some((loss, theta)) = at(value, &from) else { break };
-            // A lower loss than at the given minimum, by more than a tenth of the quantile in the statistic: the walk
-            // continues, and its lowest point is returned.
+            // If the loss is lower than at the given minimum, by more than a tenth of the quantile in the statistic,
+            // the walk continues, and its lowest point is returned.
             if loss < lowest && !stay {
                 lowest = loss;
                 lower = Some(theta.clone());

@@ -1,5 +1,5 @@
-//! Fit with different noise levels before and after the change. Fit and levels are estimated alternately until the
-//! ratio of the levels converges. The residuals are weighted by the inverse of the noise level at their time
+//! Fit with different noise levels before and after the change. The fit and the levels are estimated alternately until
+//! the ratio of the levels converges. The residuals are weighted by the inverse of the noise level at their time
 //! ([`super::noise_level`]).
 
 use super::{
@@ -16,14 +16,14 @@ use crate::{
 
 /// Largest number of rounds of fit and noise levels.
 const MAX_ROUNDS: usize = 20;
-/// The rounds end when the relative change of the ratio of the levels is below this limit; the standard error of the
+/// The rounds end when the relative change in the ratio of the levels is below this limit; the standard error of the
 /// ratio is about `1/sqrt n`, i.e. 1 % for 10000 residuals.
 const CONVERGENCE_TOLERANCE: f64 = 1e-6;
-/// Negligible relative change of the loss: it changes the log-likelihood of 10000 residuals by 0.005.
+/// Negligible relative change in the loss: it changes the log-likelihood of 10000 residuals by 0.005.
 const NEGLIGIBLE_CHANGE: f64 = 1e-6;
 
-/// Estimates fit and noise levels alternately and returns the minimum and the levels. The levels are `None` if they
-/// cannot be determined, such as for residuals that are only rounding errors.
+/// Estimates the fit and the noise levels alternately and returns the minimum and the levels. The levels are `None` if
+/// they cannot be determined, such as for residuals that are only rounding errors.
 ///
 /// # Errors
 /// [`IdentError::NoFiniteLoss`] if a search fails.

@@ -129,7 +129,7 @@ mod tests {
                 let h = 1e-3;
                 let difference =
                     (8.0 * (shifted(h) - shifted(-h)) - (shifted(2.0 * h) - shifted(-2.0 * h))) / (12.0 * h);
-                // Truncation error h^4 G^5/30, about 1e-11; rounding error of t_M divided by h, 1e-11.
+                // The truncation error is h^4 G^5/30, about 1e-11; the rounding error of t_M divided by h is 1e-11.
                 assert!((exact - difference).abs() < 1e-9, "{exact} {difference}");
             }
         }

@@ -155,7 +155,8 @@ mod tests {
             for (a, b) in flat(&known).into_iter().zip(flat(&family)) {
                 let size = a.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
                 for (x, y) in a.iter().zip(&b) {
-                    // F does not depend on the delay: the derivative is zero up to the rounding error of its size, two.
+                    // F does not depend on the delay, so its derivative is zero except for the rounding errors of
+                    // coefficients of about two.
                     assert!((x - y).abs() < 1e-10 * size + 1e-13, "{a:?} {b:?}");
                 }
             }

@@ -115,7 +115,7 @@ mod tests {
                 .filter(|t| inside(*t))
                 .map(|t| x[t as usize] * y[(t - lag) as usize])
                 .sum();
-            // Rounding error of about ten thousand terms.
+            // The tolerance allows for the rounding error of about ten thousand terms.
             assert!((found - plain).abs() < 1e-11, "lag {lag}: {found} and {plain}");
         }
     }
@@ -133,7 +133,8 @@ mod tests {
         let x = centred(x);
         let own = autocorrelation(&x, 50);
         let outside = own.values.iter().filter(|v| v.abs() > own.bound_99).count();
-        // 50 values, each outside with probability 1 %: more than four are outside with probability 1e-4.
+        // Each of the 50 values is outside with a probability of 1 %; more than four are outside with a probability of
+        // about 1e-4.
         assert!(outside <= 4, "{outside}");
         // y leads x by seven samples: x(t) = y(t - 7).
         let y: Vec<f64> = x[7..].to_vec();

@@ -93,7 +93,8 @@ mod tests {
         let u = [1.0, 3.0, 1.0, 3.0];
         assert_eq!(vaf(&u, &u), 100.0);
         assert_eq!(nrmse_fit(&u, &u), 100.0);
-        // An error of 1 in each sample: the sum of squares is 4 of 20 and equals the squared deviations from the mean.
+        // With an error of 1 in each sample, the sum of squares is 4 of 20 and equals the squared deviations from the
+        // mean.
         let off = [2.0, 2.0, 2.0, 2.0];
         assert!((vaf(&u, &off) - 80.0).abs() < 1e-12);
         assert!(nrmse_fit(&u, &off).abs() < 1e-12);

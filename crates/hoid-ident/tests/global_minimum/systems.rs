@@ -9,9 +9,9 @@ use hoid_core::filter::{divide_in_place, fir, multiply};
 use hoid_model::{Channel, Complex64, Orders, Record, SampleTime, polynomial};
 use hoid_sim::RunSeed;
 
-/// Samples of a record.
+/// Number of samples of a record.
 const SAMPLE_COUNT: usize = 300;
-/// Samples before the record.
+/// Number of samples before the record.
 const RUN_IN_SAMPLES: usize = 500;
 
 /// A system, its record, and random numbers for further use by the caller.

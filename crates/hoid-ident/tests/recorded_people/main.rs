@@ -50,8 +50,8 @@ fn parse_trial(text: &str) -> Record {
     .unwrap()
 }
 
-/// An iteration that reports convergence must not have a much larger loss than the prediction error method; on the
-/// border of stability its loss was once larger by half.
+/// An iteration that reports convergence must not have a much larger loss than the prediction error method, not even on
+/// the border of stability.
 #[test]
 #[ignore = "minutes; prints the table of all cells"]
 fn converged_fits_predict_about_as_well_as_pem() {

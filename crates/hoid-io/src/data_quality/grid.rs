@@ -170,7 +170,7 @@ fn is_even(times: &[f64], steps: &[f64], ts: f64) -> bool {
     steps.iter().all(|step| *step == 1.0) && times.iter().enumerate().all(near)
 }
 
-/// Computes for each time the grid step from the time before it.
+/// Computes the grid step to each time from the time before it.
 #[expect(
     clippy::indexing_slicing,
     clippy::arithmetic_side_effects,

@@ -90,7 +90,7 @@ hoid_model::named_choice!(QualityIssueKind, "kind of fault", 11, {
 pub struct RowSpan {
     /// First row, counted from 1 without header and comments; for a gap, the row before the gap.
     pub row: usize,
-    /// Number of rows; for a gap, number of missing rows.
+    /// Number of rows; for a gap, the number of missing rows.
     pub rows: usize,
     /// Time of the first row, s; `None` without a time column.
     pub from_s: Option<f64>,

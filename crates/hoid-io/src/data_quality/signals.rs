@@ -64,7 +64,7 @@ impl Signals<'_> {
         lengths.min().unwrap_or(0)
     }
 
-    /// Returns the time of a row, s; `None` if it is unknown.
+    /// Returns the time of a row in s; `None` if it is unknown.
     pub(super) fn time_s(&self, row: usize) -> Option<f64> {
         match (&self.time, self.nominal_hz) {
             (Some(time), _) => time.values.get(row).copied().filter(|t| t.is_finite()),

@@ -48,7 +48,7 @@ fn issue_kinds(found: &[QualityIssue]) -> Vec<QualityIssueKind> {
 fn smooth_and_quiet_channels_have_no_faults() {
     let [e, u] = smooth_channels();
     assert_eq!(issues_in(&even_times(), &e, &u), []);
-    // Slow values far from zero, printed with few decimals.
+    // Slow values far from zero that are printed with few decimals are no problem.
     let printed = |values: &[f64]| {
         values
             .iter()
@@ -56,12 +56,12 @@ fn smooth_and_quiet_channels_have_no_faults() {
             .collect::<Vec<_>>()
     };
     assert_eq!(issues_in(&even_times(), &printed(&e), &printed(&u)), []);
-    // The hand rests for a third of the time.
+    // A hand that rests for a third of the time is no problem.
     let mut resting = u.clone();
     let at = resting[1000];
     resting[1000..2300].fill(at);
     assert_eq!(issues_in(&even_times(), &e, &resting), []);
-    // Times that are rounded when printed, or in single precision.
+    // Times that are rounded when printed, or are in single precision, are no problem.
     let rounded: Vec<f64> = (0..N).map(|k| (k as f64 / 60.0 * 1e4).round() / 1e4).collect();
     let mut precision = Precision::default();
     precision.add("0.0167");

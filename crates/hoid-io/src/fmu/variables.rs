@@ -173,7 +173,7 @@ fn tracker_variables() -> Vec<FmuVariable> {
             "change_t",
             "s",
             Real(f64::NAN),
-            "time of the last declared change of the person",
+            "time of the last declared change in the person",
         ),
         output("changes", "", Integer(0), "number of declared changes"),
         output("level", "", Integer(2), "0 trustworthy, 1 doubtful, 2 not determined"),

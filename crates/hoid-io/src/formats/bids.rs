@@ -15,8 +15,8 @@ use serde::Deserialize;
 
 use crate::table::Cell;
 
-/// Number of directories searched: the directory of the recording and, above it, the directories of session, person and
-/// data set.
+/// Number of directories searched: the directory of the recording and, above it, the directories of the session, the
+/// person and the data set.
 const SEARCHED_DIRECTORY_COUNT: usize = 4;
 
 /// Content of the JSON file of a recording.
@@ -82,7 +82,8 @@ fn sidecar(path: &Path) -> Option<Sidecar> {
         })
 }
 
-/// Returns names and units of the columns from the table of channels of a motion recording; empty if there is none.
+/// Returns the names and the units of the columns from the table of channels of a motion recording; empty if there is
+/// none.
 fn channels(path: &Path) -> Vec<(String, String)> {
     let read = || {
         let stem = stem(path)?;

@@ -114,7 +114,7 @@ impl SettingsFormat {
 mod tests {
     use super::*;
 
-    /// A damaged HDF5 file of 31 kB stated an array of 128 MB, although it did not contain the data.
+    /// A damaged file of 31 kB may state an array of 128 MB that it does not contain; its budget must be smaller.
     #[test]
     fn small_files_have_a_small_budget() {
         let mut budget = Budget::of(31_128);

@@ -9,7 +9,7 @@
 //! | offset | `offset` | aligns channels that were recorded late |
 //! | rate | `rate` | low-pass filters, then keeps every M-th sample or resamples to a new frequency |
 //! | run-in | `run_in` | drops the run-in at the start |
-//! | detrend | [`Record::detrended`](hoid_model::Record::detrended) | removes the mean or a straight line from input and output |
+//! | detrend | [`Record::detrended`](hoid_model::Record::detrended) | removes the mean or a straight line from the input and the output |
 //!
 //! [`Preparation`] in `pipeline` applies the steps to the channels of a record, which `record_parts` separates. The
 //! interpolation filter of the steps offset and rate, and the decimation, are in [`hoid_model::resampling`]. For an

@@ -27,7 +27,7 @@ pub struct Preparation {
     /// Length of the initial part of the record that is dropped, s. It includes the samples cut by filters at the
     /// start.
     pub run_in_s: f64,
-    /// Trend removed from input and output, as the last step.
+    /// Trend removed from the input and the output, as the last step.
     pub detrend: Detrend,
     /// True if rows that equal an earlier row, including the time, are dropped when the file is read.
     pub drop_repeated: bool,

@@ -1,4 +1,4 @@
-//! Change of the sampling rate, with the same anti-aliasing filter for all channels.
+//! Change in the sampling rate, with the same anti-aliasing filter for all channels.
 //!
 //! **Every M-th sample** is the decimation of [`hoid_model::resampling`]: nothing is cut at the ends, and the input is
 //! taken from the middle of its longer hold, so the delay of a model is unchanged.
@@ -91,7 +91,7 @@ impl RecordParts {
                     Kernel::for_resampling((1.0 / factor).min(1.0), usize::MAX)
                         .map_or_else(|| "too many".to_owned(), |kernel| kernel.samples_per_side().to_string())
                 ),
-                "a longer record, or a smaller change of the rate",
+                "a longer record, or a smaller change in the rate",
             )
         };
         let kernel = if factor > 1.0 {

@@ -116,7 +116,7 @@ pub enum Step {
         /// Number of dropped samples, without those cut by a filter.
         samples: usize,
     },
-    /// The mean or the linear trend of input and output was removed.
+    /// The mean or the linear trend of the input and the output was removed.
     Detrend {
         /// "mean" or "linear".
         how: &'static str,

@@ -7,7 +7,7 @@ use super::*;
 
 const TS: f64 = 0.01;
 
-/// Sinusoids below 0.8 of the Nyquist frequency at 50 Hz: frequency in Hz, amplitude, phase.
+/// Sinusoids below 0.8 of the Nyquist frequency of 50 Hz: frequency in Hz, amplitude, phase.
 const WAVES: [(f64, f64, f64); 5] = [
     (0.13, 1.0, 0.3),
     (1.7, 0.8, 1.1),
@@ -155,7 +155,7 @@ fn fractional_offsets_use_band_limited_interpolation() {
         let preparation = offset_preparation("u", Offset::Samples(offset));
         let (found, steps) = preparation.apply(late).unwrap();
         let start_s = found.time_s(0) - 3.0;
-        // The sum of the amplitudes is 3, with a relative error of 1e-4.
+        // The amplitudes add up to 3, and the relative error is at most 1e-4.
         let error = max_deviation(found.output(), |k| signal(start_s + k as f64 * TS));
         assert!(error < 3e-4, "{offset}: {error:e}");
         assert!(max_deviation(found.input(), |k| signal(start_s + k as f64 * TS)) < 1e-12);
@@ -215,7 +215,7 @@ fn resampling_to_lower_and_higher_rates_is_accurate() {
         let steps = (found.time_s(0) - 3.0) / ts;
         assert!((steps - steps.round()).abs() < 1e-6, "{steps}");
     }
-    // The requested rate is the rate of the record.
+    // If the requested rate is the rate of the record, no step is applied.
     assert!(
         preparation_with(|p| p.rate = NewRate::Hz(100.0))
             .apply(record(3, signal, signal))

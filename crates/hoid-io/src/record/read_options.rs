@@ -1,4 +1,4 @@
-//! Options for reading a record: columns of input and output, trials, sampling, and permitted repairs.
+//! Options for reading a record: the columns of the input and the output, trials, sampling, and permitted repairs.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -53,11 +53,11 @@ pub struct ReadOptions {
     pub sampling_hz: Option<f64>,
     /// Selects the samples with `from <= t < to`, s. By default all samples.
     pub span_s: (Option<f64>, Option<f64>),
-    /// Columns that were logged at their own times and therefore have no value in some rows; `e` and `u` denote input
-    /// and output unless a column has that name. By default there are none.
+    /// Columns that were logged at their own times and therefore have no value in some rows; `e` and `u` denote the
+    /// input and the output unless a column has that name. By default there are none.
     pub sparse: BTreeMap<String, SparseTreatment>,
-    /// Names of columns to keep in addition to input, output and time; by default all columns are kept. Other columns
-    /// of a CSV file are not kept in memory.
+    /// Names of columns to keep in addition to the input, the output and the time; by default all columns are kept.
+    /// Other columns of a CSV file are not kept in memory.
     pub columns: Option<Vec<String>>,
     /// Permitted repairs.
     pub repair: Repair,

@@ -3,8 +3,8 @@
 //!
 //! No data are invented, and each segment has its own initial states in a fit. However, the choice of the excluded
 //! samples depends on the recorded data. Without the saturated samples, the largest responses are missing, which biases
-//! the estimate from the remaining samples: the lead of C1, clipped at 1.5 standard deviations, by 9 %. If the clipped
-//! samples are included, the gain is 12 % too small.
+//! the estimate from the remaining samples; if C1 is clipped at 1.5 standard deviations, its lead is biased by 9 %. If
+//! the clipped samples are included, the gain is 12 % too small.
 
 use std::ops::Range;
 use std::path::Path;
@@ -56,7 +56,7 @@ pub fn read_segments(
             if all.is_empty() {
                 let count = trials.len();
                 read.notes.push(format!(
-                    "{count} trials by {by} ({}): each is a separate record",
+                    "{count} trials according to {by} ({}): each is a separate record",
                     list_of_trials(&trials)
                 ));
             } else {

@@ -264,7 +264,7 @@ mod tests {
                 (vec![1, 2, 4], how == SparseTreatment::Hold)
             );
         }
-        // The times are constant.
+        // If the times are constant, the earlier value is used.
         let mut e = column(&[1.0, MISSING, 2.0]);
         ColumnCoverage::of(&e).fill(&mut e, SparseTreatment::Linear, &[0.0; 3]);
         assert_eq!(e.values, [1.0, 1.0, 2.0]);

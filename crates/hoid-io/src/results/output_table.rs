@@ -119,7 +119,7 @@ impl ColumnValues {
         self.as_values().len()
     }
 
-    /// True if the table has no rows.
+    /// True if the column has no rows.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0

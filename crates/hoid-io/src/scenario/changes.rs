@@ -86,7 +86,7 @@ impl ScenarioChanges {
         Ok(scenario)
     }
 
-    /// Rejects the options of remnant and disturbance, because the scenario file of an operator of the family defines
+    /// Rejects the remnant and disturbance options, because the scenario file of an operator of the family defines
     /// both.
     fn apply_to_family(&self, mut scenario: FamilyScenario) -> Result<FamilyScenario, ScenarioChangeError> {
         let remnant = "applies only to the remnant of the thesis; in a scenario with a form, specify the remnant in \

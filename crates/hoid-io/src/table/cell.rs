@@ -58,7 +58,7 @@ impl Cell {
             Ok(value) if value.is_nan() => Self::Missing,
             Ok(value) => Self::Number(value),
             Err(_) if MISSING_WORDS.iter().any(|word| text.eq_ignore_ascii_case(word)) => Self::Missing,
-            // Spreadsheets in some languages write the typographic minus sign, and Fortran the exponent D.
+            // Spreadsheets in some languages write the typographic minus sign, and Fortran writes the exponent D.
             Err(_) if text.contains(MINUS) || is_fortran(text) => {
                 match text.replace(MINUS, "-").replace(['d', 'D'], "e").parse::<f64>() {
                     Ok(value) if !value.is_nan() => Self::Number(value),

@@ -1,4 +1,4 @@
-//! Selection of input and output by an expression: `NAME`, `-NAME` or `NAME-NAME`.
+//! Selection of the input and the output by an expression: `NAME`, `-NAME` or `NAME-NAME`.
 //!
 //! Laboratories often record the target r and the output y of the controlled element instead of the tracking error
 //! `e = r - y`, or use the opposite sign of the control. A column whose name equals the whole text takes precedence, so
@@ -59,7 +59,7 @@ impl ColumnExpression {
         terms
     }
 
-    /// Returns for each hyphen in the text the texts before and after it.
+    /// Returns the texts before and after each hyphen in the text.
     fn splits(&self) -> impl Iterator<Item = (&str, &str)> {
         let hyphens = self.text.match_indices('-');
         hyphens.filter_map(|(at, hyphen)| {

@@ -228,7 +228,7 @@ pub(crate) fn check_column_count(columns: usize, file: &str) -> Result<(), IoErr
     })
 }
 
-/// Reads units and roles from the comments above a table, and returns the sample time stated in the comments.
+/// Reads the units and the roles from the comments above a table, and returns the sample time stated in the comments.
 pub(crate) fn read_comments<'a>(comments: impl Iterator<Item = &'a str>, columns: &mut [Column]) -> Option<f64> {
     let mut sample_time_s = None;
     for line in comments {

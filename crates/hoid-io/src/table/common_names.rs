@@ -1,4 +1,4 @@
-//! Recognition of error and control by common column names.
+//! Recognition of the error and the control by common column names.
 //!
 //! A column matches if its whole name is a common name, regardless of case. If there is no such column, the only column
 //! that contains a common name as a word matches, such as `Tracking error`, `stick [V]` or `e (deg)`. A single letter

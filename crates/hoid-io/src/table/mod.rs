@@ -9,7 +9,7 @@
 //! | `column_expression` | [`ColumnExpression`]: choice of the input and output columns |
 //! | `column_option` | [`ColumnOption`]: the option with which a column was requested |
 //! | `selection` | selection of the columns that are kept |
-//! | `common_names` | recognition of error and control by common column names |
+//! | `common_names` | recognition of the error and the control by common column names |
 
 mod cell;
 pub(crate) mod column_expression;

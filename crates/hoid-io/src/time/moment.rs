@@ -489,7 +489,7 @@ mod tests {
             column(&["59:59.5", "00:00.0", "59:59.5", "00:00.0"]),
             [0.0, 0.5, 3600.0, 3600.5]
         );
-        // A time that restarts with each trial, a clock that is set back, and a date.
+        // No period is added for a time that restarts with each trial, a clock that is set back, or a date.
         assert_eq!(column(&["00:00:30", "00:00:00", "00:00:01"]), [0.0, -30.0, -29.0]);
         assert_eq!(column(&["12:00:00", "11:59:59"]), [0.0, -1.0]);
         assert_eq!(

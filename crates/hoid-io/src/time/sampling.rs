@@ -338,7 +338,7 @@ mod tests {
                 }
             }
         }
-        // The printed steps alternate between 0.01 and 0.02.
+        // The rate of 60 Hz is found, although the printed steps alternate between 0.01 and 0.02.
         let (t, precision) = printed_times(grid(2000, 0.0, 1.0 / 60.0), 2);
         assert_eq!(even_sampling(&t, precision, None).unwrap().sample_time_s, 1.0 / 60.0);
     }
@@ -428,7 +428,7 @@ mod tests {
             assert_eq!((row, missing, gaps), (399, 1, 2), "{decimals} decimals");
             assert!((sample_time_s - 0.01).abs() < 1e-4);
         }
-        // The times are counts of samples instead of s.
+        // If the times are counts of samples, a missing count is a gap.
         let (mut t, precision) = printed_times(grid(50, 0.0, 1.0), 0);
         t.remove(20);
         assert!(matches!(

@@ -490,7 +490,7 @@ mod tests {
         ] {
             assert_eq!(unit(first, step), Unit::Power(power), "{first} {step}");
         }
-        // Serial days at 100 Hz, and seconds since midnight.
+        // Serial days at 100 Hz are recognised; numbers with longer steps or of another size are in s.
         for (first, step, unit_found) in [
             (45_321.5, 0.01 / 86_400.0, Unit::Days),
             (739_000.5, 0.01 / 86_400.0, Unit::Days),
@@ -505,7 +505,7 @@ mod tests {
         assert!(!is_serial_days(&[45_321.5, 45_321.500_000_1, 12.0]));
         assert_eq!(infer_unit(&[f64::NAN], false), Unit::Power(0));
         assert_eq!(infer_unit(&[], false), Unit::Power(0));
-        // Written as 0.0, 10.0, ..., and integers with steps of about a minute.
+        // Times written as 0.0, 10.0, ... are in s; integers whose steps are only about a minute are in ms.
         assert_eq!(infer_unit(&times(0.0, 10.0), true), Unit::Power(0));
         assert_eq!(infer_unit(&[0.0, 60.0, 121.0, 180.0], false), Unit::Power(-3));
     }

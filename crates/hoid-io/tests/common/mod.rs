@@ -37,7 +37,7 @@ impl TestFolder {
     }
 }
 
-/// Options with input and output given by these expressions.
+/// Options with the input and the output given by these expressions.
 pub fn options(input: &str, output: &str) -> ReadOptions {
     ReadOptions {
         input: Some(input.parse().unwrap()),

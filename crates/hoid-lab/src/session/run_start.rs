@@ -173,7 +173,7 @@ impl EndRecord {
         read_json(&path).map(Some)
     }
 
-    /// Returns the SHA-256 hashes of the appended files in their current state; an empty text for a missing file.
+    /// Returns the SHA-256 hashes of the appended files in their current state; an empty string for a missing file.
     ///
     /// # Errors
     /// [`LabError::Io`].

@@ -4,9 +4,9 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::ContinuousTransferFunction;
 
-/// Returns numerator and denominator of the held system in ascending powers of `z^-1`, for a delay of a `fraction` of a
-/// sample. A nonzero fraction makes the numerator longer by one coefficient. `None` if the matrix exponential is not
-/// finite.
+/// Returns the numerator and the denominator of the held system in ascending powers of `z^-1`, for a delay of a
+/// `fraction` of a sample. A nonzero fraction makes the numerator longer by one coefficient. `None` if the matrix
+/// exponential is not finite.
 pub(super) fn zoh_equivalent(
     h: &ContinuousTransferFunction,
     ts: f64,

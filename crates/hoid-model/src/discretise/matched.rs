@@ -4,8 +4,8 @@ use num_complex::Complex64;
 
 use crate::{ContinuousTransferFunction, polynomial};
 
-/// Maps poles and zeros by `z = e^{s Ts}` and returns numerator and denominator in descending powers of z. `None` if
-/// the roots cannot be found.
+/// Maps poles and zeros by `z = e^{s Ts}` and returns the numerator and the denominator in descending powers of z.
+/// `None` if the roots cannot be found.
 pub(super) fn matched_pole_zero(h: &ContinuousTransferFunction, ts: f64) -> Option<(Vec<f64>, Vec<f64>)> {
     let poles = polynomial::roots(h.den())?;
     let leading = h.num()[0];

@@ -97,7 +97,7 @@ fn non_finite_result_error(h: &ContinuousTransferFunction) -> ModelError {
     }
 }
 
-/// Returns numerator and denominator in descending powers of z after the substitution `s = c (z - 1) / q(z)`.
+/// Returns the numerator and the denominator in descending powers of z after the substitution `s = c (z - 1) / q(z)`.
 fn substitute(h: &ContinuousTransferFunction, c: f64, q: [f64; 2]) -> Result<(Vec<f64>, Vec<f64>), ModelError> {
     let order = h.den().len() - 1;
     let den = substitute_in_polynomial(h.den(), order, c, q);

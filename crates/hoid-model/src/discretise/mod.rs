@@ -25,9 +25,9 @@
 //!
 //! **Matched.** Of the r zeros at infinity, r - 1 are mapped to z = -1 and one remains at infinity, which gives a delay
 //! of one sample. This is the modified matched method of Franklin, Powell and Workman (section 6.2) and of MATLAB's
-//! `c2d(..., 'matched')`. The gain makes the continuous and the discrete response equal at s = 0. If there are k poles
-//! (or zeros) at s = 0, `s^k H(s)` and `((z - 1)/Ts)^k H(z)` are equal in the limit of small real s, which preserves
-//! the velocity or acceleration constant. With or without roots at s = 0, the gain follows from the products of
+//! `c2d(..., 'matched')`. The gain makes the continuous and discrete responses equal at s = 0. If there are k poles (or
+//! zeros) at s = 0, `s^k H(s)` and `((z - 1)/Ts)^k H(z)` are equal in the limit of small real s, which preserves the
+//! velocity or acceleration constant. With or without roots at s = 0, the gain follows from the products of
 //! `p / (e^{p Ts} - 1)` over the poles and over the zeros; a factor with p = 0 is 1/Ts.
 
 mod hold;

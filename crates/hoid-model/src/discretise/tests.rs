@@ -145,8 +145,8 @@ fn response_to(h: &DiscreteTransferFunction, input: impl Fn(usize) -> f64, sampl
 
 #[test]
 fn holds_are_exact_with_fractional_delay() {
-    // 0.7 + 2/(s + 3) with a delay of 2.3 samples, computed by hand. Step and ramp start at t = 0, so the holds are
-    // exact.
+    // 0.7 + 2/(s + 3) with a delay of 2.3 samples, computed by hand. The step and the ramp start at t = 0, so the holds
+    // are exact.
     let sample_time = ts(0.1);
     let delay = 0.23;
     let h = tf(&[0.7, 4.1], &[1.0, 3.0]).with_delay(delay).unwrap();
@@ -244,12 +244,12 @@ fn degenerate_systems_keep_their_static_gain() {
         let stable = discretise(&tf(&[4.5, 11.4], &[1.0, 7.875, 126.5625]), ts(0.01), method).unwrap();
         assert!((stable.response(0.0).re - 11.4 / 126.5625).abs() < 1e-12, "{method:?}");
     }
-    // Poles at 1/Ts and 2/Ts have no image under backward Euler and Tustin.
+    // Poles at 1/Ts and 2/Ts have no image under backward Euler and Tustin, respectively.
     let fast = |p: f64| tf(&[1.0], &[1.0, -p]);
     assert!(discretise(&fast(100.0), ts(0.01), Method::BackwardEuler).is_err());
     assert!(discretise(&fast(200.0), ts(0.01), Method::Tustin).is_err());
     assert!(discretise(&fast(100.0), ts(0.01), Method::Tustin).is_ok());
-    // e^{1e6} overflows; a fast stable pole does not.
+    // e^{1e6} overflows, whereas the exponential of a fast stable pole does not.
     for method in [Method::ZeroOrderHold, Method::FirstOrderHold, Method::Matched] {
         assert!(discretise(&fast(1e8), ts(0.01), method).is_err(), "{method:?}");
         assert!(discretise(&fast(-1e6), ts(0.01), method).is_ok(), "{method:?}");

@@ -2,8 +2,8 @@
 //! parts and a drifting stick.
 //!
 //! `e = f - y`, `u = Y e + F f + M y + n`, `y = P (u + d)`, where f is a target that the person may see (F,
-//! [`Feedforward`]), y a motion that the person may feel (M), and d is a disturbance at the input of the controlled
-//! element P. Changes follow the sigmoid of eq. 5, as in
+//! [`Feedforward`]), y is the output of the controlled element, a motion that the person may feel (M), and d is a
+//! disturbance at the input of the controlled element P. Changes follow the sigmoid of eq. 5, as in
 //! [`Scenario`](crate::scenario::Scenario). `Scenario` is the task of the thesis and remains a separate type: its
 //! operator is a gain with a lead, and its controlled element is `K_c/(s(s + omega_b))`.
 //!
@@ -12,8 +12,8 @@
 //! | `state` | [`FamilyState`]: operator and controlled element at one instant |
 //! | `display` | [`Display`]: the signals that the person sees |
 //! | `multi_sine` | [`MultiSine`], [`Excitation`]: targets and disturbances as used in experiments with people |
-//! | `remnant` | [`RemnantPart`], [`Stick`]: components of u other than the response to e and f |
-//! | `typical_feedforward` | [`typical_feedforward`](typical_feedforward()): response to a target with the inverse of the machine |
+//! | `remnant` | [`RemnantPart`], [`Stick`]: components of u other than the responses to e, f and y |
+//! | `typical_feedforward` | [`typical_feedforward`](typical_feedforward()): response to a target, based on the inverse of the machine |
 //! | `scenario` | [`FamilyScenario`] and the quantities that a simulation derives from it |
 
 mod display;

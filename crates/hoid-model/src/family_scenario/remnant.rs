@@ -1,4 +1,4 @@
-//! Components of u other than the response to e and f: the remnant, and drift and offsets of the stick.
+//! Components of u other than the responses to e, f and y: the remnant, and the drift and the offsets of the stick.
 //!
 //! The remnant is a sum of independent parts. Each part is a white sequence w of unit variance, passed through a
 //! shaping filter and a gain,

@@ -269,7 +269,7 @@ impl ResolvedFamilyScenario {
         Ok(Some(seen.at(t_s, schedule, *sample_time, muscles)?))
     }
 
-    /// Returns operator and controlled element at time `t_s`.
+    /// Returns the operator and the controlled element at time `t_s`.
     ///
     /// # Errors
     /// [`ModelError`] if the transition between the two valid states passes through an invalid state.

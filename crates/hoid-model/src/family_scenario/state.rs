@@ -23,7 +23,7 @@ impl FamilyState {
         Ok(self.operator.transfer_function()?.series(&self.controlled_element))
     }
 
-    /// Returns crossover frequency and margins of the open loop in continuous time.
+    /// Returns the crossover frequency and the margins of the open loop in continuous time.
     ///
     /// # Errors
     /// As [`FamilyState::crossings`].
@@ -53,8 +53,8 @@ impl FamilyState {
 
     /// Returns a state between this state and another one. `between` computes each parameter of the operator
     /// ([`FamilyOperator::coordinates`], with omega_nm and zeta_nm instead of their logarithms) and of the controlled
-    /// element (its leading gain, and the coefficients of numerator and denominator without this gain). The delay of
-    /// this state is kept.
+    /// element (its leading gain, and the coefficients of the numerator and the denominator without this gain). The
+    /// delay of this state is kept.
     pub(super) fn interpolated(&self, other: &Self, between: impl Fn(f64, f64) -> f64) -> Result<Self, ModelError> {
         let (c, d) = (&self.controlled_element, &other.controlled_element);
         let pairs = |p: &[f64], q: &[f64]| p.iter().zip(q).map(|(p, q)| between(*p, *q)).collect::<Vec<f64>>();

@@ -1,15 +1,15 @@
 //! The typical response of people to a displayed target, without a fit to their data.
 //!
-//! **Inverse of the machine.** People who see the target move their hand such that the machine follows it: `F P = g`
-//! near 3 rad/s, with g somewhat below one (R. J. Wasicko, D. T. McRuer and R. E. Magdaleno, *Human Pilot Dynamic
-//! Response in Single-Loop Systems with Compensatory and Pursuit Displays*, AFFDL-TR-66-137, 1966; M. Mulder et al.,
-//! *IEEE Trans. Human-Machine Systems* 48 (2018) 457-469). With `s = d ln|P|/d ln omega` at 3 rad/s ([`slope`]), F must
-//! have the slope -s: it is a gain, the rate (`K_d s`), or the rate with a lead that adds the remaining slope.
-//! Typically, g is .7 ([`FOLLOWED_FRACTION`]); virtual people have values of .4 to 1.
+//! **Inverse of the machine.** People who see the target move their hand so that the machine follows it: `F P = g` near
+//! 3 rad/s, with g somewhat below one (R. J. Wasicko, D. T. McRuer and R. E. Magdaleno, *Human Pilot Dynamic Response
+//! in Single-Loop Systems with Compensatory and Pursuit Displays*, AFFDL-TR-66-137, 1966; M. Mulder et al., *IEEE
+//! Trans. Human-Machine Systems* 48 (2018) 457-469). With `s = d ln|P|/d ln omega` at 3 rad/s ([`slope`]), F must have
+//! the slope -s: it is a gain, the rate (`K_d s`), or the rate with a lead that adds the remaining slope. Typically, g
+//! is .7 ([`FOLLOWED_FRACTION`]); virtual people have values of .4 to 1.
 //!
 //! **Delay.** Without preview, the delay is the same as in the response to the error. With preview, people respond to
-//! the future target, and the delay is `-2 zeta_nm/omega_nm`, which compensates the lag of the neuromuscular system at
-//! low frequencies.
+//! the future target, and the delay is `-2 zeta_nm/omega_nm`, which compensates for the lag of the neuromuscular system
+//! at low frequencies.
 
 use super::{display::Display, state::FamilyState};
 use crate::{ContinuousTransferFunction, FamilyOperator, Feedforward, Form, ModelError, operator_family::Coordinate};
@@ -47,7 +47,7 @@ pub fn time_constant(slope: f64, longest_s: f64) -> f64 {
 /// Returns the typical response to the target for a person with this response to the error. `followed` is the fraction
 /// g of the target that the machine follows. With a display of the future target, the preview is `shown_s`. `None` for
 /// an element whose gain rises with frequency, or falls so steeply that its inverse is proper only with a neuromuscular
-/// system, which the person does not have.
+/// system, for a person without one.
 ///
 /// # Errors
 /// As [`FamilyOperator::new`].
@@ -151,8 +151,8 @@ mod tests {
     #[test]
     fn some_elements_have_no_typical_response() {
         let of = |state: &FamilyState| typical_feedforward(state, Display::Pursuit, 0.7, 0.0).unwrap();
-        // An element whose gain rises with frequency, and an element whose inverse is improper without a neuromuscular
-        // system.
+        // There is no response for an element whose gain rises with frequency, or whose inverse is improper without a
+        // neuromuscular system.
         let rising = FamilyState {
             controlled_element: "(s+1)/(s+9)".parse().unwrap(),
             ..person("1/s")
@@ -163,7 +163,7 @@ mod tests {
             ..person("3/s^2")
         };
         assert!(of(&bare).is_none());
-        // A preview that is shorter than the neuromuscular lag.
+        // If the preview is shorter than the neuromuscular lag, the delay relative to the end of the preview is zero.
         let short = typical_feedforward(&person("1/s"), Display::Preview, 0.7, 0.02)
             .unwrap()
             .unwrap();

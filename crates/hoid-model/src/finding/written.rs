@@ -44,7 +44,7 @@ impl From<WrittenVerdict> for Verdict {
             VerdictLevel::NotDetermined => Severity::Undetermined,
             _ => Severity::Doubt,
         };
-        // A sentence of an earlier version has no kind, and the severity that follows from its place.
+        // A sentence from an earlier version has no kind; its severity follows from its place.
         let with = |severity: Severity| {
             move |one: Finding| Finding {
                 severity: if one.kind.is_empty() { severity } else { one.severity },

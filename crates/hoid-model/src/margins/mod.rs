@@ -1,4 +1,4 @@
-//! Crossover frequency, phase and gain margin, and the stability of a loop with delay.
+//! Crossover frequency, phase and gain margins, and the stability of a loop with delay.
 //!
 //! For the open loop L in a loop with unit negative feedback,
 //!

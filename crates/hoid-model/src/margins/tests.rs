@@ -173,7 +173,7 @@ fn stability_changes_at_the_gain_margin() {
 
 #[test]
 fn stability_with_delay_matches_closed_form() {
-    // K e^{-s tau}/s is stable for K tau < pi/2.
+    // The loop with K e^{-s tau}/s is stable for K tau < pi/2.
     for tau in [1e-3, 0.28, 40.0] {
         for (product, stable) in [(1e-4, true), (1.57, true), (1.5709, false), (4.0, false), (60.0, false)] {
             assert_eq!(
@@ -266,12 +266,12 @@ fn marginal_and_hidden_modes_are_not_stable() {
     assert!(!closed_loop_is_stable(&tf(&[-1.0], &[1.0])));
     // (s - 1)/((s - 1)(s + 2)): the unstable mode is in the loop, although it cancels in the transfer function.
     assert!(!closed_loop_is_stable(&tf(&[1.0, -1.0], &[1.0, 1.0, -2.0])));
-    // Two modes within one step of the grid, which together turn the phase by whole revolutions.
+    // Two modes within one step of the grid are detected, although together they turn the phase by whole revolutions.
     for (damping, stable) in [(1e-6, true), (-1e-6, false)] {
         let modes = polynomial::product(&[1.0, damping, 7.3], &[1.0, damping, 7.4]);
         assert_eq!(closed_loop_is_stable(&tf(&[1e-12], &modes)), stable);
     }
-    // A damping ratio of 1e-6 and of -1e-6, at a frequency that is not on the grid.
+    // A mode with the damping coefficient 1e-6 or -1e-6 in 1/s is detected at a frequency that is not on the grid.
     for (damping, stable) in [(1e-6, true), (-1e-6, false)] {
         assert_eq!(closed_loop_is_stable(&tf(&[1e-12], &[1.0, damping, 7.3])), stable);
     }
@@ -320,7 +320,7 @@ fn unstable_pole_counts_match_the_transfer_function() {
                 let scaled = scaled(operator, gain);
                 let l = scaled.series(element);
                 let Some(found) = unstable_poles(|w| scaled.response(w), element, 300.0) else {
-                    // There is no result only if |L| is still above 1 at 300 rad/s, as for a pure gain with a
+                    // A result is missing only if |L| is still near or above 1 at 300 rad/s, as for a pure gain with a
                     // first-order element of high gain.
                     assert!(l.response(300.0).norm() > 0.5, "{gain} {operator:?} {element:?}");
                     continue;

@@ -26,7 +26,7 @@ impl FittedOperator {
     /// Returns the fit unchanged if its values are valid.
     ///
     /// # Errors
-    /// [`ModelError::Operator`] for a covariance of another size, numbers that are not finite, and variances that are
+    /// [`ModelError::Operator`] for a covariance of the wrong size, numbers that are not finite, and variances that are
     /// not positive.
     pub fn checked(self) -> Result<Self, ModelError> {
         let p = self.operator.coordinates().len();

@@ -26,7 +26,7 @@ pub enum Form {
     LeadDroop,
     /// `K_d s`: the response to the rate of a displayed target.
     Derivative,
-    /// `K_d s (T_L s + 1)`: the response to rate and acceleration of a displayed target.
+    /// `K_d s (T_L s + 1)`: the response to the rate and the acceleration of a displayed target.
     DerivativeLead,
     /// `K_m s^2 (0.11 s + 1)/(5.9 s + 1)`: the response of the semicircular canals to rotation, for an input that is an
     /// angle. The canals respond to the angular acceleration with fixed time constants (R. J. A. W. Hosman, *Pilot's
@@ -55,15 +55,15 @@ crate::named_choice!(Form, "form of the operator", 12, {
 /// Leak rate of an integration, 1/s. It is too low to be visible in a record, but keeps the discrete model stable.
 const LEAK_RATE_PER_S: f64 = 1e-4;
 
-/// Time constants of the semicircular canals, s: of the lead and of the lag, which turns the response to the angular
-/// acceleration into one to the angular rate between 0.17 and 9 rad/s.
+/// Time constants of the lead and the lag of the semicircular canals, s. Between 0.17 and 9 rad/s, the lag turns the
+/// response to the angular acceleration into a response to the angular rate.
 const CANAL_TIME_CONSTANTS_S: (f64, f64) = (0.11, 5.9);
 
 /// Number of coefficients of the numerator, for powers of s from 0 to 3.
 pub const POWER_COUNT: usize = 4;
 
-/// A coordinate in which an operator is fitted. Lag and neuromuscular part are fitted in coordinates whose estimates
-/// are nearly normal even if the data carry little information.
+/// A coordinate in which an operator is fitted. The lag and the neuromuscular part are fitted in coordinates whose
+/// estimates are nearly normal even if the data carry little information.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 pub enum Coordinate {
     /// Gain of the form: K without a pole, `K/T_I` with a lag, K_I with an integration, K_d (in s) of a derivative, K_m
@@ -183,7 +183,8 @@ impl Form {
         )
     }
 
-    /// Returns name and unit of the parameter by which a gain of this form is given: `K`, `K_I`, `K_d` or `K_m`.
+    /// Returns the name and the unit of the parameter by which a gain of this form is given: `K`, `K_I`, `K_d` or
+    /// `K_m`.
     pub fn gain_name_and_unit(self) -> (&'static str, &'static str) {
         match self {
             Self::QuadraticIntegral => ("K_I", "1/s"),
@@ -194,7 +195,7 @@ impl Form {
         }
     }
 
-    /// Returns the degree of the numerator, which is the power p of the lead in forms that consist of lead and lag.
+    /// Returns the degree of the numerator, which is the power p of the lead in forms that consist of a lead and a lag.
     pub fn degree(self) -> usize {
         match self {
             Self::Gain | Self::Lag => 0,
@@ -286,7 +287,7 @@ impl Form {
         }
     }
 
-    /// Computes numerator and pole from the coordinates, without the neuromuscular part and the delay.
+    /// Computes the numerator and the pole from the coordinates, without the neuromuscular part and the delay.
     pub(super) fn rational(self, x: &[Dual]) -> Rational {
         let zero = Dual::constant(0.0);
         let k = x[0];

@@ -73,7 +73,7 @@ impl FamilyResponse {
             let gradient = self.gradient.iter().map(|g| part(g / self.value));
             gradient.collect()
         };
-        // The variance of the sum of real and imaginary part contains their covariance twice.
+        // The variance of the sum of the real and imaginary parts contains their covariance twice.
         let [a, c, both] = [along(|z| z.re), along(|z| z.im), along(|z| z.re + z.im)]
             .map(|gradient| variance_along(&gradient, covariance));
         let b = 0.5 * (both - a - c);
@@ -420,7 +420,7 @@ mod tests {
         operator(form, true, 0.1837)
     }
 
-    /// A change of gain affects only the real part of `dY/Y`, a change of delay only the imaginary part.
+    /// A change in gain affects only the real part of `dY/Y`, and a change in delay affects only the imaginary part.
     #[test]
     fn gain_affects_real_part_and_delay_imaginary_part_of_relative_covariance() {
         let operator = FamilyOperator::new(Form::Gain, false, &[2.0, 0.3]).unwrap();

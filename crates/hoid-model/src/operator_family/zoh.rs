@@ -13,10 +13,10 @@
 //! Phi, and B is the product of F and the impulse response. All computations use dual numbers ([`super::dual`]), which
 //! carry the derivatives with respect to the coordinates.
 //!
-//! **Direct part.** If numerator and denominator of a form have the same degree, the operator has a direct feedthrough
-//! of e. With a held error, the output would jump from one value of e to the next when the delay passes an integer
-//! number of samples. The direct part is therefore computed from the error interpolated linearly between the samples
-//! around `t - tau - Ts/2`. The additional delay Ts/2 is the delay that the hold gives to all other parts.
+//! **Direct part.** If the numerator and the denominator of a form have the same degree, the operator has a direct
+//! feedthrough of e. With a held error, the output would jump from one value of e to the next when the delay passes an
+//! integer number of samples. The direct part is therefore computed from the error interpolated linearly between the
+//! samples around `t - tau - Ts/2`. The additional delay Ts/2 is the delay that the hold adds to all other parts.
 
 use super::{
     dual::{Dual, PARTIAL_COUNT},
@@ -220,7 +220,7 @@ impl FamilyOperator {
         ZohFamilyOperator::from_impulse_response(sample + shift, &impulse, &poles.f)
     }
 
-    /// Returns numerator and monic denominator of the operator in ascending powers of `s Ts`.
+    /// Returns the numerator and the monic denominator of the operator in ascending powers of `s Ts`.
     pub(super) fn scaled_polynomials(&self, variables: &[Dual], ts: f64) -> (Vector, Vector) {
         let Rational { numerator, .. } = self.form().rational(variables);
         (
@@ -321,7 +321,8 @@ mod tests {
                 };
                 let scale = exact.jacobian.iter().map(|row| row[i].abs()).fold(1e-3, f64::max);
                 for ((row, up), down) in exact.jacobian.iter().zip(at(h)).zip(at(-h)) {
-                    // The error of the difference is the truncation, h^2, and the rounding, eps/h.
+                    // The error of the difference consists of a truncation error of order h^2 and a rounding error of
+                    // order eps/h.
                     let error = (row[i] - (up - down) / (2.0 * h)).abs();
                     assert!(error < 1e-8 * scale + 1e-7, "{operator:?} {i} {error}");
                 }
@@ -342,8 +343,8 @@ mod tests {
                     * backward.powi(held.nk as i32);
                 let hold = Complex64::from_polar(1.0, -omega * ts_s / 2.0);
                 let expected = operator.response(omega) * hold;
-                // Hold and aliases contribute at most (omega Ts)^2. The response of a derivative form is small at low
-                // frequencies, where the relative error is larger.
+                // The hold and the aliases contribute at most (omega Ts)^2. The response of a derivative form is small
+                // at low frequencies, where the relative error is larger.
                 let small = if operator.form().is_derivative() {
                     omega.min(1.0)
                 } else {

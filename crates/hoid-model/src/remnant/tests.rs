@@ -68,7 +68,7 @@ fn backward_euler_agrees_with_the_general_discretisation() {
 
 #[test]
 fn first_order_filter_is_an_autoregression() {
-    // Values of corrections.md: d1 = -0.8465 (exact) and -0.8571 (backward Euler).
+    // The expected values are d1 = -0.8465 (exact) and d1 = -0.8571 (backward Euler).
     let filter = RemnantFilter::new(1.0, 0.06, 1).unwrap();
     let exact = filter.noise_model(ts(), RemnantDiscretisation::default()).unwrap();
     assert_eq!(exact.c, vec![1.0]);
@@ -144,7 +144,7 @@ fn retrieve_inverts_noise_model() {
         for how in DISCRETISATIONS {
             let model = filter.noise_model(ts(), how).unwrap();
             let found = retrieve(&model.d[1..], model.innovation_sd, ts(), how).unwrap();
-            // With T_n of 2000 samples, 1 - alpha has 12 correct digits, and K_n depends on its power m.
+            // With T_n of 2000 samples, 1 - alpha has 12 correct digits, and K_n depends on its m-th power.
             let tolerance = 1e-14 * filter.time_constant_s.max(0.01) / 0.01 * 20.0;
             assert!(
                 (found.t_n_s / filter.time_constant_s - 1.0).abs() < tolerance,
@@ -192,8 +192,8 @@ fn jacobian_agrees_with_finite_differences() {
                     let (up, down) = (at(1.0), at(-1.0));
                     for i in 0..2 {
                         let difference = (up[i] - down[i]) / (2.0 * h);
-                        // The error of the difference is the truncation (h/(1 - alpha))^2, where 1 - alpha is at least
-                        // 0.03, and the rounding eps/h.
+                        // The error of the difference consists of a truncation error of order (h/(1 - alpha))^2, where
+                        // 1 - alpha is at least 0.03, and a rounding error of order eps/h.
                         assert!(
                             (exact[i][j] - difference).abs() <= 2e-6 * difference.abs(),
                             "{how:?} m {m} T_n {t} row {i} column {j}: {} and {difference}",

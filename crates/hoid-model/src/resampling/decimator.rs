@@ -177,7 +177,7 @@ impl DecimatedChannel {
         let first = self.past.front().copied().unwrap_or(self.last);
         for k in 1..=half {
             // The k - 1 values inserted so far have shifted sample k to position 2 k - 1. It is missing only after
-            // altered numbers were restored.
+            // altered numbers have been restored.
             let value = 2.0 * first - self.past.get(2 * k - 1).unwrap_or(&first);
             self.past.push_front(value);
         }

@@ -160,8 +160,8 @@ mod tests {
         }
     }
 
-    /// Amplitude and delay in samples of an interpolated sinusoid; the frequency is in cycles per sample, and the
-    /// instant is this fraction after a sample.
+    /// Amplitude and delay in samples of an interpolated sinusoid; `frequency` is in cycles per sample, and `fraction`
+    /// is the position of the instant between two samples.
     fn response((offset, weights): &(isize, Vec<f64>), frequency: f64, fraction: f64) -> (f64, f64) {
         let omega = 2.0 * PI * frequency;
         let (mut re, mut im) = (0.0, 0.0);

@@ -1,4 +1,4 @@
-//! Changes of the sampling rate: the filter, and decimation.
+//! Changes in the sampling rate: the filter, and decimation.
 //!
 //! For a signal x that is sampled every Ts, decimation by M keeps, after a low-pass filter h of linear phase,
 //!

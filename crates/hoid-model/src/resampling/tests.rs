@@ -47,8 +47,8 @@ fn sum_of_sines_is_preserved_at_the_new_rate() {
         assert!(lost.abs() <= 0.5 * done.factor as f64, "no sample is lost: {lost}");
         assert!((found.time_s(0) + 2.0).abs() < 1e-12);
         assert!((done.lead_s - 0.5 * (ts - 1.0 / hz)).abs() < 1e-15);
-        // The tolerance is 80 dB below the sum of the amplitudes, which is 6. At a new rate of 83 Hz, the pass band
-        // still ends above 31 Hz.
+        // The tolerance is 80 dB below the sum of the offset and the amplitudes, which is about 6. At a new rate of 83
+        // Hz, the pass band still ends above 31 Hz.
         for (values, lead, times) in [
             (found.input(), done.lead_s, 1.0),
             (found.output(), 0.0, 2.0),

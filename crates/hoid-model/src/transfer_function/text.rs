@@ -14,8 +14,8 @@
 //! so that `90/(s(s+6))`, `(2s+1)/(s^2+0.4s+1)` and `0.5(s+1)/s/(s+2)` have their expected meaning. A number precedes
 //! the factor that it multiplies (`s2` is a mistyped `s^2`). A factor that follows a divisor without an operator in
 //! between is ambiguous (`90/s(s+6)`) and is rejected; the error message shows both unambiguous notations. Common
-//! factors of numerator and denominator are kept: `s/s^2` has a pole that is cancelled in its response. A delay is a
-//! factor of the whole expression.
+//! factors of the numerator and the denominator are kept: `s/s^2` has a pole that is cancelled in its response. A delay
+//! is a factor of the whole expression.
 //!
 //! | file | contents |
 //! |---|---|

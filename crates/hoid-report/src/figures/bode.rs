@@ -29,7 +29,7 @@ const PHASE_STEPS: [f64; 6] = [15.0, 30.0, 45.0, 90.0, 180.0, 360.0];
 
 /// Number of frequencies of a curve.
 const POINT_COUNT: usize = 240;
-/// Lowest frequency of manual control, rad/s, followed by the highest; on an axis from 0.1 to 50 rad/s there are ticks
+/// Lowest frequency of manual control (rad/s), followed by the highest; on an axis from 0.1 to 50 rad/s there are ticks
 /// at 1, 2 and 5 in each decade.
 const MIN_OMEGA_RAD_S: f64 = 0.1;
 const MAX_OMEGA_RAD_S: f64 = 50.0;
@@ -215,7 +215,7 @@ fn frequencies(models: &[BodeModel<'_>], points: &[BodePoints]) -> Vec<f64> {
     (0..POINT_COUNT).map(|i| low * (ratio * i as f64).exp()).collect()
 }
 
-/// Values and standard errors of magnitude and phase over frequency.
+/// Values and standard errors of the magnitude and the phase over frequency.
 struct Curve {
     magnitude_db: Vec<(f64, Option<f64>)>,
     phase_deg: Vec<(f64, Option<f64>)>,

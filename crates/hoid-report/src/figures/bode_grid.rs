@@ -22,22 +22,22 @@ pub struct BodeCurve {
     pub kind: LineKind,
     /// Colour of the curve.
     pub shade: Shade,
-    /// Frequencies, rad/s, in ascending order.
+    /// Frequencies (rad/s) in ascending order.
     pub omega_rad_s: Vec<f64>,
     /// Magnitude in dB at each frequency. Non-finite values leave gaps.
     pub magnitude_db: Vec<f64>,
     /// Phase in deg at each frequency; full turns may be added or missing.
     pub phase_deg: Vec<f64>,
-    /// Lower and upper edge of the band of the magnitude, dB; empty if there is no band.
+    /// Lower and upper edges of the band of the magnitude (dB); empty if there is no band.
     pub magnitude_band: Vec<(f64, f64)>,
-    /// Lower and upper edge of the band of the phase, deg, on the branch of the phase; empty if there is no band.
+    /// Lower and upper edges of the band of the phase (deg), on the branch of the phase; empty if there is no band.
     pub phase_band: Vec<(f64, f64)>,
-    /// Lower and upper end of the error bar of each magnitude, dB; empty if there are no error bars.
+    /// Lower and upper ends of the error bar of each magnitude (dB); empty if there are no error bars.
     pub magnitude_bars: Vec<(f64, f64)>,
-    /// Lower and upper end of the error bar of each phase, deg, on the branch of the phase; empty if there are no error
-    /// bars.
+    /// Lower and upper ends of the error bar of each phase (deg), on the branch of the phase; empty if there are no
+    /// error bars.
     pub phase_bars: Vec<(f64, f64)>,
-    /// Delay removed while the phase is unwrapped, s: the delay of the model, or zero.
+    /// Delay removed while the phase is unwrapped (s): the delay of the model, or zero.
     pub delay_s: f64,
 }
 

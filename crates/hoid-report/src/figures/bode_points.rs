@@ -20,13 +20,13 @@ const CAP_HALF_WIDTH: f64 = 2.5;
 pub struct BodePoints {
     /// Name in the legend.
     pub name: String,
-    /// Frequencies, rad/s, in ascending order.
+    /// Frequencies (rad/s) in ascending order.
     pub omega_rad_s: Vec<f64>,
     /// Magnitude in dB at each frequency, with its standard error if known. Non-finite values are omitted.
     pub magnitude_db: Vec<Estimate>,
     /// Phase in deg at each frequency, with its standard error if known; full turns may be added or missing.
     pub phase_deg: Vec<Estimate>,
-    /// Delay removed while the phase is unwrapped, s; used only if there is no curve.
+    /// Delay removed while the phase is unwrapped (s); used only if there is no curve.
     pub delay_s: f64,
 }
 
@@ -42,7 +42,7 @@ impl BodePoints {
         }
     }
 
-    /// The points with finite magnitude and phase and a finite, positive frequency.
+    /// The points with a finite magnitude, a finite phase, and a finite, positive frequency.
     pub(super) fn drawable_points(&self) -> Self {
         let n = self
             .omega_rad_s

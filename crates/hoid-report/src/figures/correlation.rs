@@ -24,8 +24,8 @@ pub fn autocorrelation(id: &str, correlation: &Correlation, sample_time: SampleT
     )
 }
 
-/// Draws the cross-correlation of residuals and input over negative and positive lags with its 99 % bounds. Values
-/// outside the bounds are vermillion.
+/// Draws the cross-correlation of the residuals and the input over negative and positive lags with its 99 % bounds.
+/// Values outside the bounds are vermillion.
 pub fn cross_correlation(id: &str, correlation: &Correlation, sample_time: SampleTime) -> String {
     stems(
         id,

@@ -61,9 +61,9 @@ pub struct Curve {
     pub x: Vec<f64>,
     /// Ordinates. A value that is not finite leaves a gap; so does a value that is not positive on a logarithmic axis.
     pub y: Vec<f64>,
-    /// Lower and upper edge of the band at each abscissa; empty if there is no band.
+    /// Lower and upper edges of the band at each abscissa; empty if there is no band.
     pub band: Vec<(f64, f64)>,
-    /// Lower and upper end of the error bar at each abscissa; empty if there are no error bars.
+    /// Lower and upper ends of the error bar at each abscissa; empty if there are no error bars.
     pub bars: Vec<(f64, f64)>,
 }
 

@@ -30,7 +30,7 @@ const POINT_COUNT: usize = 240;
 pub struct ModelCurve {
     /// Name in the legend.
     pub name: String,
-    /// Frequencies, rad/s, in ascending order.
+    /// Frequencies (rad/s) in ascending order.
     pub omega_rad_s: Vec<f64>,
     /// Response at each frequency.
     pub response: Vec<Complex64>,

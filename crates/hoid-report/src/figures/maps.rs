@@ -33,7 +33,7 @@ pub struct MapPanel {
     pub name: String,
     /// Values by ordinate, from the lowest, and by abscissa. Cells with a non-finite or missing value are hatched.
     pub values: Vec<Vec<f64>>,
-    /// Indices of abscissa and ordinate, from zero, of the cell marked by a cross.
+    /// Indices (from zero) along the abscissa and the ordinate of the cell marked by a cross.
     pub marked: Option<(usize, usize)>,
 }
 

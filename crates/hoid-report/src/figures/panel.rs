@@ -40,11 +40,11 @@ pub struct TraceCurve {
     pub method: usize,
     /// Index of the level in the grid, which determines the shade; unused if the grid has no levels.
     pub level: usize,
-    /// Times, s, in ascending order.
+    /// Times (s) in ascending order.
     pub times_s: Vec<f64>,
     /// One value for each time. Non-finite values leave gaps.
     pub values: Vec<f64>,
-    /// Lower and upper edge of the band at each time; empty if there is no band.
+    /// Lower and upper edges of the band at each time; empty if there is no band.
     pub band: Vec<(f64, f64)>,
 }
 

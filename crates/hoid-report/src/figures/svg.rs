@@ -10,8 +10,8 @@ use super::{
     labels::{has_tags, insert_tags, strip_markers},
 };
 
-/// Returns the SVG text with a view box, with which it scales with the page, a title for screen readers, and the id of
-/// the figure as the prefix of all other ids.
+/// Returns the SVG text with a view box (so that the figure scales with the page), a title for screen readers, and the
+/// id of the figure as the prefix of all other ids.
 pub fn finish(id: &str, title: &str, scene: Scene) -> String {
     let scene = anchor_tagged_texts(scene);
     let raw = SvgBackend::new().render_scene(&scene);

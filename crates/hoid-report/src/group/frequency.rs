@@ -135,7 +135,7 @@ impl GroupReport<'_> {
         figures
     }
 
-    /// Delay of a person, s, for unwrapping the phase from line to line; 0 if unknown.
+    /// Delay of a person (s), for unwrapping the phase from line to line; 0 if unknown.
     fn delay_s(&self, subject: &str, condition: &str) -> f64 {
         let of = |p: &&Person| p.subject == subject && p.condition == condition;
         let person = self.summary.people.iter().find(of);
@@ -176,7 +176,7 @@ impl GroupReport<'_> {
         FITS.into_iter().filter_map(curve).collect()
     }
 
-    /// Agreement between fits and describing function, one row for each subject, condition and estimator.
+    /// Agreement between the fits and the describing function, one row for each subject, condition and estimator.
     pub(super) fn agreement(&self) -> Vec<Value> {
         let Some(table) = self.tables.frequencies.map(|f| f.agreement) else {
             return Vec::new();

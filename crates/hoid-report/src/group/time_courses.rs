@@ -187,7 +187,7 @@ impl GroupReport<'_> {
         rows
     }
 
-    /// Time of the task change in a condition, s, from the manifest or, if joined runs were used, from the table of
+    /// Time (s) of the task change in a condition, from the manifest or, if joined runs were used, from the table of
     /// settling times.
     fn change_s(&self, condition: &str) -> Option<f64> {
         let known = self

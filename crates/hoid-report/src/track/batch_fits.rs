@@ -5,7 +5,7 @@ use hoid_model::{Orders, Record};
 use hoid_numerics::statistics::upper_median;
 use hoid_track::{StartSource, Trace};
 
-/// The span of a batch fit, s, and the fit.
+/// The span of a batch fit (s) and the fit.
 pub type BatchFit = ((f64, f64), Fit);
 
 /// Returns the orders of a trace. If the trace tracks the delay, nk is the median of the estimated delay in a span (s).
@@ -45,8 +45,9 @@ pub fn batch_fit(trace: &Trace, record: &Record, (from, to): (f64, f64)) -> Resu
     Ok(((from, to), estimator.fit(&[record.span(from, to)?])?))
 }
 
-/// Returns the default batch fits for comparison with a trace: the start fit and, if the method needs one, a fit to the
-/// last third of the record. The second element is the error of the fit to the last third, if that fit fails.
+/// Returns the default batch fits for comparison with a trace: the start fit and, unless the method starts without a
+/// fit, a fit to the last third of the record. The second element is the error of the fit to the last third, if that
+/// fit fails.
 pub fn default_batch_fits(trace: &Trace, record: &Record) -> (Vec<BatchFit>, Option<IdentError>) {
     let mut all = Vec::new();
     if let (Some(start), StartSource::Span(Some((from, to)))) = (trace.start(), &trace.options().start)

@@ -18,7 +18,7 @@ use crate::{
     numbers::{DASH, format_fixed, format_plain},
 };
 
-/// Time from which errors are evaluated, s; it excludes the initial transient of a recursion.
+/// Time (in s) from which errors are evaluated; it excludes the initial transient of a recursion.
 const ERROR_START_S: f64 = 10.0;
 
 /// Returns one row per method: its description, its forgetting and its start.
@@ -118,7 +118,7 @@ fn reasons(trace: &EvaluatedTrace<'_>) -> Vec<ConversionFailure> {
         }
     }
     let mut reasons: Vec<ConversionFailure> = found.into_iter().map(|f| f.1).collect();
-    // The sort is stable: reasons with equal counts stay in the order of time.
+    // The sort is stable: reasons with equal counts stay in chronological order.
     reasons.sort_by_key(|r| std::cmp::Reverse(r.rows));
     reasons
 }

@@ -1,7 +1,7 @@
 //! Gains at which each part of the remnant has its share of the variance of u.
 //!
 //! Part i with gain 1 contributes `V_i = sum over k of h_i(k)^2` to the variance of u, where h_i is the response of u,
-//! through the closed loop, to one unit of w at sample 0. The sinusoids of target and disturbance contribute
+//! through the closed loop, to one unit of w at sample 0. The sinusoids of the target and the disturbance contribute
 //! `V_0 = sum of A^2/2 |u/f|^2` at their frequencies, with the responses of the sampled loop. For a target to which the
 //! person responds with F, `e/f = (1 - P F)/(1 + B P)` and `u/f = (B + F)/(1 + B P)`, where B is the response to the
 //! error. With a response M to motion, `1 + B P` is `1 + (B - M) P` and `e/f` has `M + F` in place of F. All parts are
@@ -143,13 +143,13 @@ fn response_energies(held: &ZohLoop, shaping: &Shaping) -> Result<MeanSquares, M
     }
 }
 
-/// Returns the frequency response of a held operator; `backward` is the delay operator of one sample.
+/// Returns the frequency response of a held operator; `backward` is the factor of a delay of one sample.
 fn zoh_response(held: &ZohFamilyOperator, backward: Complex64) -> Complex64 {
     let denominator = 1.0 + backward * polynomial::value(&held.f, backward);
     polynomial::value(&held.b, backward) * backward.powu(held.nk as u32) / denominator
 }
 
-/// Returns the mean squares due to target and disturbance.
+/// Returns the mean squares due to the target and the disturbance.
 fn line_powers(
     held: &ZohLoop,
     scenario: &FamilyScenario,

@@ -3,9 +3,8 @@
 //! Simulates `u = r(k - l) + n` as [`FamilySimulator`] does in a loop, with the same random numbers, and with the
 //! remnant as strong as in the loop of the scenario. A loop that responds to u like the controlled element of the
 //! scenario therefore gives a bit-identical run. The offsets of the recorder in e and u (`offset_e`, `offset_u`) are
-//! not part of the operator, nor are the responses to a displayed target and to motion, which belong to
-//! the loop. The control at a sample
-//! must not depend on the error of the same sample.
+//! not part of the operator, nor are the responses to a displayed target and to motion, which belong to the loop. The
+//! control at a sample must not depend on the error of the same sample.
 
 use super::{FamilySimulator, remnant_run::RemnantRun, zoh_loop::ZohLoop};
 use crate::{RunSeed, SimError, operator_run::saved_sample, zoh_operator::OperatorState};
@@ -143,7 +142,8 @@ mod tests {
         scenario
     }
 
-    /// Returns a scenario in which delay and element change, with every kind of remnant and a random walk of the stick.
+    /// Returns a scenario in which the gain and the delay change, with every kind of remnant and a random walk of the
+    /// stick.
     fn scenario_with_all_remnants() -> FamilyScenario {
         let person = |k: f64, tau_e_s: f64| [k, 0.5, 3.0, 11.0_f64.ln(), 0.25_f64.ln(), tau_e_s];
         let of = |k, tau_e_s| state(Form::LeadLag, true, &person(k, tau_e_s), [&[1.0], &[1.0, 0.0]]);
@@ -202,7 +202,7 @@ mod tests {
         scenario
     }
 
-    /// Returns a scenario with a gain and a delay of a fraction of a sample only.
+    /// Returns a scenario whose operator is only a gain with a delay of this number of samples.
     fn gain_scenario(samples: f64) -> FamilyScenario {
         let mut scenario = task(state(Form::Gain, false, &[1.5, 0.01 * samples], [&[1.0], &[1.0, 0.0]]));
         scenario.remnant = vec![RemnantPart::new(RemnantShape::White, 0.1)];
@@ -233,7 +233,7 @@ mod tests {
         }
     }
 
-    /// A saved operator continues in another operator, also after the end of its scenario.
+    /// A saved state continues in another operator, also after the end of its scenario.
     #[test]
     fn restored_operator_continues_bit_identically() {
         let new =

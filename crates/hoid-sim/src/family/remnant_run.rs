@@ -25,8 +25,8 @@ pub(super) struct Remnants {
 }
 
 impl Remnants {
-    /// Returns a value of the calibration at sample `k`, between its values in the initial and the final state. After
-    /// the end of the scenario it is the value at the last sample.
+    /// Returns a value of the calibration at sample `k`, between its values in the initial and final states. After the
+    /// end of the scenario it is the value at the last sample.
     #[inline]
     fn calibrated_value(&self, scenario: &ResolvedFamilyScenario, k: usize, of: impl Fn(&Calibration) -> f64) -> f64 {
         let [initial, last] = &self.calibrations;

@@ -3,7 +3,7 @@
 //! Parameters that change follow the sigmoid at each sample, with the exact hold for these values
 //! ([`zoh_loop`](super::zoh_loop)). The gains of the remnant are computed for the initial and the final state and
 //! follow the same sigmoid. The random numbers of a run are identified by its [`RunSeed`]; each part of the remnant,
-//! the stick, and the phases of target and disturbance have separate streams.
+//! the stick, and the phases of the target and the disturbance have separate streams.
 
 use std::f64::consts::TAU;
 
@@ -175,12 +175,14 @@ impl FamilySimulator {
         [&initial.gains, &last.gains]
     }
 
-    /// Returns the variance of u in a long run, without bias and random walk of the stick, before and after the change.
+    /// Returns the variance of u in a long run, without the bias and the random walk of the stick, before and after the
+    /// change.
     pub fn control_variance(&self) -> [f64; 2] {
         [0, 1].map(|i| self.remnants.calibrations[i].mean_squares[0])
     }
 
-    /// Returns the variance of e in a long run, without bias and random walk of the stick, before and after the change.
+    /// Returns the variance of e in a long run, without the bias and the random walk of the stick, before and after the
+    /// change.
     pub fn error_variance(&self) -> [f64; 2] {
         [0, 1].map(|i| self.remnants.calibrations[i].mean_squares[2])
     }

@@ -4,11 +4,10 @@
 //!
 //! `u = r(k - l) + m(k - l_m) + n`, `y = C x_p + D (u + d)`, `e = f - y`,
 //!
-//! where r is the response of the operator after the fractional part of the delay `tau = l Ts + delta`, m likewise the
-//! response to the motion y if the person feels it, and x_p the
-//! state of the controlled element. Operator ([`ZohOperator`]) and element are then advanced exactly by one sample,
-//! for held inputs. If a direct response of the operator and D form a loop within a sample, both equations are solved
-//! together.
+//! where r is the response of the operator after the fractional part of the delay `tau = l Ts + delta`, m is likewise
+//! the response to the motion y if the person feels it, and x_p is the state of the controlled element. The operator
+//! ([`ZohOperator`]) and the element are then advanced exactly by one sample, for held inputs. If a direct response of
+//! the operator and D form a loop within a sample, both equations are solved together.
 
 use hoid_model::{
     Complex64, ModelError, SampleTime, family_scenario::FamilyState, feedforward::OperatorWithDelay,
@@ -17,7 +16,7 @@ use hoid_model::{
 
 use crate::zoh_operator::{OperatorOutput, OperatorState, ZohOperator};
 
-/// Smallest accepted magnitude of `1 + D Y` within a sample.
+/// Smallest accepted magnitude of `1 + D (Y - M)` within a sample.
 const MIN_RETURN_DIFFERENCE: f64 = 1e-9;
 
 /// Closed loop with its parameters at one instant.
@@ -65,7 +64,7 @@ impl ZohLoop {
         sample_time: SampleTime,
     ) -> Result<Self, ModelError> {
         let p = &state.controlled_element;
-        // The leading gain is kept separate, since the realisation determines whether a sudden change of this gain
+        // The leading gain is kept separate, since the realisation determines whether a sudden change in this gain
         // makes y jump.
         let gain = p.num()[0];
         let num: Vec<f64> = p
@@ -97,8 +96,8 @@ impl ZohLoop {
         self.element_input * self.element_output * self.element.direct_feedthrough()
     }
 
-    /// Returns `1 + D (Y - M)`, where D, Y and M are the direct responses of the element, to the error and to motion
-    /// within a sample.
+    /// Returns `1 + D (Y - M)`, where D is the direct response of the element within a sample, and Y and M are those of
+    /// the person to the error and to motion.
     fn return_difference(&self) -> f64 {
         let felt = self.motion.as_ref().map_or(0.0, ZohOperator::feedthrough);
         1.0 + self.element_feedthrough() * (self.operator.feedthrough() - felt)
@@ -165,8 +164,8 @@ impl ZohLoop {
         }
     }
 
-    /// Returns the frequency responses of operator and element in the sampled loop; `None` if a response does not exist
-    /// at this frequency.
+    /// Returns the frequency responses of the operator and the element in the sampled loop; `None` if a response does
+    /// not exist at this frequency.
     pub fn responses(&self, omega_rad_s: f64) -> Option<[Complex64; 2]> {
         let element = self.element.response(omega_rad_s)? + self.element.direct_feedthrough();
         Some([

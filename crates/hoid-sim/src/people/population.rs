@@ -82,7 +82,7 @@ pub struct Population {
     /// Phase margin in deg.
     pub phase_margin_deg: Range,
     /// Largest `|1/(1 + Y P)|` of an accepted loop; above this limit a loop counts as resonant. Default: 4, the value
-    /// at the crossover for a phase margin of 14 deg.
+    /// at the crossover for a phase margin of 14.4 deg.
     pub largest_sensitivity: f64,
     /// Share of the variance of u that is due to the remnant. Default: 0.05 to 0.5.
     pub remnant_share: Range,
@@ -207,8 +207,8 @@ impl Plant {
         }
     }
 
-    /// Returns target and disturbance of a task with a displayed target: the multi-sine of [`Plant::disturbance`],
-    /// whose primes are used alternately by target and disturbance.
+    /// Returns the target and the disturbance of a task with a displayed target: the multi-sine of
+    /// [`Plant::disturbance`], whose primes are used alternately by the target and the disturbance.
     pub fn interleaved_excitations(self) -> [MultiSine; 2] {
         [Interleaved::Even, Interleaved::Odd].map(|interleaved| MultiSine {
             interleaved,

@@ -114,7 +114,7 @@ impl AnalysisSettings {
     /// recursions that start from a fit.
     ///
     /// # Errors
-    /// As [`Self::polynomials`] and [`Self::recursions`].
+    /// Same as [`Self::polynomials`] and [`Self::recursions`].
     pub(super) fn structures(&self) -> Result<Vec<Structure>, String> {
         let (fitted, recursions) = (self.polynomials()?, self.recursions()?);
         let started = |structure: Structure| {

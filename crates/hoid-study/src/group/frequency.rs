@@ -2,7 +2,7 @@
 //! [`hoid_ident::frequency`]).
 //!
 //! For each subject and each condition whose manifest entry names an excitation, the tables give the describing
-//! function over the readable runs, its verdict, and crossover and margins with the controlled element, as in
+//! function over the readable runs, its verdict, and the crossover and margins with the controlled element, as in
 //! `hoid describe` ([`describe_runs`]). The describing functions complement the parametric fits, whose structure they
 //! do not assume.
 //!

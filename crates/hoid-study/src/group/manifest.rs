@@ -136,7 +136,7 @@ impl Manifest {
     /// Parses the text of a manifest; `path` is used in messages.
     ///
     /// # Errors
-    /// As [`Manifest::read`].
+    /// Same as [`Manifest::read`].
     pub fn parse(text: &str, path: &str) -> Result<Self, StudyError> {
         let bad = |line: Option<usize>, reason: String| StudyError::Plan {
             path: path.to_owned(),
@@ -273,7 +273,7 @@ impl Manifest {
     /// Returns the decimation by sampling frequency that applies to the runs of a condition.
     ///
     /// # Errors
-    /// As [`Manifest::preparation`].
+    /// Same as [`Manifest::preparation`].
     pub fn rate_decimation(&self, condition: &str) -> Result<Decimation, String> {
         let of_condition = self
             .conditions

@@ -447,7 +447,7 @@ mod tests {
         let earlier = read_people(&table).remove(0).verdict.unwrap();
         assert!(earlier.reasons().eq(["one", "two; three"]) && earlier.notes().eq(["four"]));
         assert_eq!((person.name().as_str(), failed.name().as_str()), ("P in c, run 3", "Q"));
-        // No person has a lead: no columns for it.
+        // No person has a lead, so there are no columns for it.
         assert!(table.column("T_L").is_none() && table.column("T_I_low").is_some());
         assert!(table.column("r_tau_f").is_some() && table.column("y_tau_f").is_none());
         assert!(table.column("weight_gain").is_none() && table.column("weight_lead").is_some());

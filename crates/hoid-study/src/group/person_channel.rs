@@ -19,7 +19,7 @@ const ROLE_SUFFIX: &str = "_role";
 /// The delay of a response to a further input.
 const DELAY_PARAMETER: (&str, &str) = ("tau_f", "s");
 
-/// Returns names and units of the parameters of a response to a further input.
+/// Returns the names and units of the parameters of a response to a further input.
 fn parameters() -> impl Iterator<Item = (&'static str, &'static str)> {
     PARAMETERS.into_iter().chain([DELAY_PARAMETER])
 }

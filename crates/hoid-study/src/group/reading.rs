@@ -209,7 +209,7 @@ pub(super) fn read_run(manifest: &Manifest, base: &Path, entry: &RunEntry, pairi
 pub struct RecordedRun {
     /// The prepared record.
     pub record: Record,
-    /// Time at which the task changes, s: from the manifest, or the time at which two files are joined.
+    /// Time at which the task changes (in s): from the manifest, or the time at which two files are joined.
     pub change_s: Option<f64>,
 }
 

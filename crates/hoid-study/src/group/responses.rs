@@ -65,13 +65,13 @@ pub(super) struct MedianResponse {
 }
 
 impl MedianResponse {
-    /// Interpolates gain in dB and phase linearly over log omega; `None` outside the grid.
+    /// Interpolates the gain in dB and the phase linearly over log omega; `None` outside the grid.
     pub fn at(&self, omega_rad_s: f64) -> Option<Complex64> {
         let [decibel, degrees] = self.decibel_and_degrees(omega_rad_s)?;
         Some(Complex64::from_polar(10f64.powf(decibel / 20.0), degrees.to_radians()))
     }
 
-    /// Returns the interpolated gain in dB and phase in deg; `None` outside the grid.
+    /// Returns the interpolated gain in dB and the interpolated phase in deg; `None` outside the grid.
     pub fn decibel_and_degrees(&self, omega_rad_s: f64) -> Option<[f64; 2]> {
         let k = self.omega_rad_s.partition_point(|omega| *omega <= omega_rad_s);
         let (low, high) = (k.checked_sub(1)?, k);

@@ -26,7 +26,7 @@ use crate::{
 /// Analyses the runs that the manifest marks with `counts`. File names are relative to `base`.
 ///
 /// # Errors
-/// As [`crate::run`](fn@crate::run).
+/// Same as [`crate::run`](fn@crate::run).
 pub fn run_group(
     manifest: &Manifest,
     base: &Path,

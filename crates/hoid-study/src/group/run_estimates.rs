@@ -87,8 +87,8 @@ impl RunEstimates {
         self.parameters.get(&key)?.get(name).copied()
     }
 
-    /// Returns gain in dB and phase in deg of the operator of a run, or of the joint fit (`run = None`); `None` outside
-    /// 0.1 to 40 rad/s.
+    /// Returns the gain in dB and the phase in deg of the operator of a run, or of the joint fit (`run = None`); `None`
+    /// outside 0.1 to 40 rad/s.
     pub fn response(&self, [subject, condition]: [&str; 2], run: Option<&str>, omega_rad_s: f64) -> Option<[f64; 2]> {
         let key = [subject, condition, run.unwrap_or(ALL_RUNS)].map(str::to_owned);
         self.responses.get(&key)?.decibel_and_degrees(omega_rad_s)

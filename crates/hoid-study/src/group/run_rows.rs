@@ -125,8 +125,8 @@ impl<'a> RunRows<'a> {
         }
     }
 
-    /// Writes the frequency response of a fit of the whole run and, if the controlled element is known, crossover and
-    /// phase margin.
+    /// Writes the frequency response of a fit of the whole run and, if the controlled element is known, the crossover
+    /// and phase margin.
     pub fn write_response_rows(&mut self, window: Window, label: &str, fit: &Fit, sample_time_s: f64) {
         if window.name != WHOLE_RUN {
             return;

@@ -158,7 +158,7 @@ impl Step {
 mod tests {
     use super::*;
 
-    /// Two runs of a first-order step from 1 to 3 at 10 s, with a ripple of known deviation.
+    /// Returns the trace of a run: a first-order step from 1 to 3 at 10 s, with a ripple of known deviation.
     fn traces(run: usize) -> OutputTable {
         let mut rows = Rows::new(&schema(
             text_columns(&["subject", "condition", "run", "estimator"]).chain(real_columns(&["t", "K_e", "flat"])),

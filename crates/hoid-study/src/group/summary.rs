@@ -64,7 +64,7 @@ pub struct RunFault {
     pub kind: String,
     /// Channel; empty if the fault concerns all channels or the time.
     pub channel: String,
-    /// Time of the first sample of the fault, s; `None` if the fault has no location in time.
+    /// Time of the first sample of the fault (in s); `None` if the fault has no location in time.
     pub from_s: Option<f64>,
     /// Size of the fault, in the unit that belongs to its kind.
     pub size: f64,
@@ -185,7 +185,7 @@ fn findings(runs: usize, failures: &[RunFailure], people: &[Person], other: usiz
     if other > 0 {
         all.push(Finding::note(
             "fits-failed",
-            format!("other fits that failed: {other}; the table estimates gives the reasons"),
+            format!("other fits failed ({other}); estimates.parquet gives the reasons"),
         ));
     }
     all
@@ -222,7 +222,7 @@ mod tests {
         assert_eq!(group_verdict(2, 0, &[person(Trustworthy)]).level, Trustworthy);
         assert_eq!(group_verdict(2, 1, &[person(Trustworthy)]).level, Doubtful);
         assert_eq!(group_verdict(2, 2, &[]).level, NotDetermined);
-        // The task of one of two people does not change.
+        // If the operator of only one of two people is determined, the group is doubtful.
         let both = [person(Trustworthy), person(NotDetermined)];
         let verdict = group_verdict(2, 0, &both);
         assert_eq!(verdict.level, Doubtful);

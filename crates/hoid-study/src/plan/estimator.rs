@@ -42,7 +42,7 @@ pub struct EstimatorCell {
     pub versus: Option<String>,
     /// Names of the scenarios to which the estimator is applied; `None` for all scenarios.
     pub scenarios: Option<Vec<String>>,
-    /// Span of the record that is used, s; `None` for the whole record.
+    /// Span of the record that is used (in s); `None` for the whole record.
     pub span_s: Option<(f64, f64)>,
     /// Number n if only every n-th sample is used.
     pub decimate: usize,

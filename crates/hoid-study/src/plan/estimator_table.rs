@@ -377,7 +377,7 @@ impl EstimatorTable {
         structure: Structure,
         at: &impl Fn(&str, String) -> PlanProblem,
     ) -> Result<TrackOptions, PlanProblem> {
-        // Options are set in the order of the registry, in which the rule of forgetting precedes its own options.
+        // Options are set in the order of the registry, in which the forgetting rule precedes its own options.
         let known = hoid_survey::registry().into_iter().flat_map(|spec| spec.settings);
         let mut left: BTreeMap<&str, &toml::Value> = self.settings.iter().map(|(k, v)| (k.as_str(), v)).collect();
         for setting in known {

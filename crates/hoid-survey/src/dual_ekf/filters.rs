@@ -32,7 +32,7 @@ pub(super) struct Filters {
     /// Parameters K_e, K_e_dot, omega_nm and zeta_nm; with a Padé approximation also tau_e.
     pub w: DVector<f64>,
     pub p_w: DMatrix<f64>,
-    /// Increase of each diagonal element of P_w per sample.
+    /// Increase in each diagonal element of P_w per sample.
     pub walk: DVector<f64>,
     /// Derivative dx/dw of the corrected state.
     pub slope: DMatrix<f64>,

@@ -11,17 +11,17 @@
 //!
 //! where A and B follow from the exact hold. The parameters `w = [K_e, K_e_dot, omega_nm, zeta_nm]` are a random walk.
 //! At each sample the parameters are predicted (they stay constant, P_w grows), the state is predicted with these
-//! parameters, and the innovation `eps = u - C x` corrects both state and parameters. The parameters are corrected
-//! along the total derivative `h = d(C x)/dw`, which includes the dependence of the state on the parameters:
+//! parameters, and the innovation `eps = u - C x` corrects both the state and the parameters. The parameters are
+//! corrected along the total derivative `h = d(C x)/dw`, which includes the dependence of the state on the parameters:
 //!
 //! `D(k|k-1) = A D(k-1|k-1) + (dA/dw) x + (dB/dw) e`, `h = C D(k|k-1) + (dC/dw) x`, `D(k|k) = D(k|k-1) - g h`, where g
 //! is the gain of the state filter, whose dependence on w is neglected.
 //!
-//! A joint filter ([`crate::joint_filter`]) also estimates the covariance between state and parameters, which two
-//! alternating filters neglect. By default the delay is a whole number of samples, as in all other methods. If `pade`
-//! is 1 to 3, the delay is a further parameter and may change or differ from a multiple of the sample time. It is
-//! represented by the Padé approximation of this order ([`super::pade`]), as in the source and in the discussion of the
-//! thesis. The states of the approximation lie between y_1 and n.
+//! A joint filter ([`crate::joint_filter`]) also estimates the covariance between the state and the parameters, which
+//! two alternating filters neglect. By default the delay is a whole number of samples, as in all other methods. If
+//! `pade` is 1 to 3, the delay is a further parameter and may change or differ from a multiple of the sample time. It
+//! is represented by the Padé approximation of this order ([`super::pade`]), as in the source and in the discussion of
+//! the thesis. The states of the approximation lie between y_1 and n.
 
 mod filters;
 mod pade;
@@ -86,7 +86,8 @@ impl RecursiveMethod for DualEkfOptions {
     fn description(&self) -> MethodDescription {
         MethodDescription {
             name: NAME,
-            help: "two alternating extended Kalman filters, of state and of parameters, for comparison",
+            help: "two alternating extended Kalman filters, one for the state and one for the parameters, for \
+                   comparison",
             source: "Wan and Nelson 2001; Popovici, Zaal and Pool 2017",
             structures: &[Structure::BoxJenkins, Structure::General],
             defaults: &[],

@@ -1,4 +1,4 @@
-//! The recursion of the joint filter of state and parameters: start, bounds and restarts.
+//! The recursion of the joint filter of the state and the parameters: start, bounds and restarts.
 
 use hoid_core::{
     bounds::clamp,

@@ -1,4 +1,4 @@
-//! Joint estimation of state and parameters, as published for time-varying human control, for comparison.
+//! Joint estimation of the state and the parameters, as published for time-varying human control, for comparison.
 //!
 //! The state of the neuromuscular system, p (its response to the delayed error) and v (the rate of p), is estimated
 //! together with the drifting parameters:
@@ -8,7 +8,7 @@
 //! The transition is the exact hold. With [`DividedDifferences`] at the poles multiplied by Ts, `R = omega^2 Ts Phi_1`,
 //! `A = q Phi_2` and `m = e - p`,
 //!
-//! `p <- e - (1 - A) m + (R/omega^2) v`, `v <- R m + (1 - A - 2 zeta R/omega) v`;
+//! `p <- e - (1 - A) m + (R/omega^2) v`, `v <- R m + (1 - A - 2 zeta R/omega) v`.
 //!
 //! The parameters are modelled as a random walk, and the remnant as white noise in u and in the input of v. Neither
 //! assumption holds for a coloured remnant in a closed loop, but the published estimators make both. [`ekf`] linearises
@@ -116,14 +116,14 @@ settings! {
 joint_filter!(
     EkfOptions,
     "ekf",
-    "extended Kalman filter of state and parameters, for comparison",
+    "extended Kalman filter that estimates state and parameters, for comparison",
     "Jazwinski 1970, section 8.3; after Popovici, Zaal and Pool 2017",
     ekf::step
 );
 joint_filter!(
     UkfOptions,
     "ukf",
-    "unscented Kalman filter of state and parameters, for comparison",
+    "unscented Kalman filter that estimates state and parameters, for comparison",
     "after Rojer, Pool, van Paassen and Mulder 2019",
     ukf::step
 );

@@ -4,7 +4,7 @@
 //! | module | contents |
 //! |---|---|
 //! | [`physical`] | the prediction-error method in physical parameters |
-//! | [`multiple_model`] | a bank of hypotheses about the time of a change of the operator |
+//! | [`multiple_model`] | a bank of hypotheses about the time of a change in the operator |
 
 pub mod multiple_model;
 pub mod physical;

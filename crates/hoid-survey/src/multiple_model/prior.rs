@@ -16,7 +16,7 @@ use crate::kernel::multiple_model::{
 const BIRTH_INTERVAL_S: f64 = 0.32;
 /// Mean time between two changes, s.
 const MEAN_CHANGE_INTERVAL_S: f64 = 60.0;
-/// Prior standard deviations of a change of K_e and of K_e_dot, in the units of [`ChangePrior::gain_jump`].
+/// Prior standard deviations of a change in K_e and in K_e_dot, in the units of [`ChangePrior::gain_jump`].
 const CHANGE_SD: [f64; 2] = [0.15, 0.5];
 /// Standard deviation of the drift of each gain in one second, in the units of [`ChangePrior::gain_drift`].
 const GAIN_DRIFT: f64 = 0.005;
@@ -24,15 +24,15 @@ const GAIN_DRIFT: f64 = 0.005;
 /// [`ChangePrior::transient_drift`]; `TRANSIENT_TIME_CONSTANT_S` is the time constant of its decay, s.
 const TRANSIENT_DRIFT: [f64; PARAMETER_COUNT] = [0.05, 0.25, 0.2, 0.2];
 const TRANSIENT_TIME_CONSTANT_S: f64 = 3.0;
-/// Prior standard deviations of a relative change of omega_nm and of zeta_nm. A hypothesis that omega_nm and zeta_nm
+/// Prior standard deviations of a relative change in omega_nm and in zeta_nm. A hypothesis that omega_nm and zeta_nm
 /// also changed is created every `NEUROMUSCULAR_BIRTH_INTERVAL` births; `NEUROMUSCULAR_ODDS` are the odds of this
-/// change against a change of the gains alone.
+/// change against a change in the gains alone.
 const NEUROMUSCULAR_CHANGE_SD: [f64; 2] = [0.25, 0.4];
 const NEUROMUSCULAR_BIRTH_INTERVAL: u32 = 4;
 const NEUROMUSCULAR_ODDS: f64 = 0.3;
 /// Crossover frequency, which scales K_e_dot relative to K_e, rad/s.
 const CROSSOVER_RAD_S: f64 = 2.0;
-/// Memory length of the innovation variance, s; `RETAINED_MEMORY_S` is the part of this length that remains after a
+/// Memory length of the innovation variance (s); `RETAINED_MEMORY_S` is the part of this length that remains after a
 /// change.
 const LEVEL_MEMORY_S: f64 = 20.0;
 const RETAINED_MEMORY_S: f64 = 1.0;
@@ -44,7 +44,7 @@ const SETTLING_TIME_S: f64 = 0.5;
 const MAX_RECENT_AGE_S: f64 = 4.0;
 
 /// Interval between proposals of other delays, in births. The following constants are the number of delays proposed,
-/// the odds of a change of the delay against a change of the gains alone, the standard deviation of that change in s,
+/// the odds of a change in the delay against a change in the gains alone, the standard deviation of that change in s,
 /// and the probability of a delay next to the likeliest delay.
 const DELAY_BIRTH_INTERVAL: u32 = 4;
 const PROPOSED_DELAY_COUNT: usize = 8;

@@ -86,7 +86,7 @@ pub(crate) struct Mixture {
     pub variance: f64,
 }
 
-/// Output and signals after the whitening filter; `None` if they are unknown.
+/// The output and the signals after the whitening filter; `None` if they are unknown.
 type WhitenedSample = Option<(f64, Signals)>;
 
 /// Returns the two-sided estimates for the rows of a causal run.
@@ -174,8 +174,8 @@ fn pair_mixtures(
     Ok(joined)
 }
 
-/// Returns output and signals of every sample after the whitening filter D, with filters linearised about `about` and
-/// started at rest.
+/// Returns the output and the signals of every sample after the whitening filter D, with filters linearised about
+/// `about` and started at rest.
 fn whitened_samples(record: &Record, nk: usize, largest: f64, d: &[f64], about: [f64; 2]) -> Vec<WhitenedSample> {
     let (e, u) = (record.input(), record.output());
     let sound = |v: f64| v.abs() <= largest;
@@ -291,7 +291,7 @@ struct ForwardBackward<'a> {
 }
 
 impl<'a> ForwardBackward<'a> {
-    /// Lower bound of the decrease of the log weight due to the differences between f and b: `z'z` is not smaller than
+    /// Lower bound on the decrease in the log weight due to the differences between f and b: `z'z` is not smaller than
     /// the squared difference of a single parameter divided by its variance. The constant 0.01 allows for rounding
     /// errors.
     fn half_squared_distance(f: &OneSidedHypothesis, b: &OneSidedHypothesis) -> f64 {

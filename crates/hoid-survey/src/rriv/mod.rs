@@ -11,7 +11,7 @@
 //! are a posteriori: each filter processes a sample again with the updated auxiliary model.
 //!
 //! **Auxiliary model.** The auxiliary model is the estimate, low-pass filtered with the shortest memory length of B and
-//! F. If the estimate was not filtered, the instruments would depend on its errors, and with short memory lengths some
+//! F. If the estimate were not filtered, the instruments would depend on its errors, and with short memory lengths some
 //! runs would diverge. The reported innovation and innovation variance are computed with the auxiliary model, whose
 //! filters run in any case.
 //!

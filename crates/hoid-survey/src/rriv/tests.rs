@@ -379,7 +379,7 @@ fn missing_output_is_replaced_by_its_prediction() {
         }
     }
     assert_eq!(recursion.theta(), theta);
-    // 780 squares of unit variance have a relative spread of 5 %; the noise model forgets the gap in about five
+    // The mean of 780 squares has a relative standard error of 5 %; the noise model forgets the gap in about five
     // samples.
     assert!((squares / count - 1.0_f64).abs() < 0.2, "{}", squares / count);
 }

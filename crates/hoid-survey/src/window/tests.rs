@@ -193,7 +193,7 @@ fn window_collects_samples_without_fitting() {
         .map(|s| recursion.step(s).innovation.powi(2))
         .sum();
     let ratio = squares / 90.0 / recursion.innovation_variance();
-    // 90 squares have a relative spread of sqrt(2/90) = 0.15.
+    // The mean of 90 squares has a relative standard error of sqrt(2/90) = 0.15.
     assert!((0.5..1.6).contains(&ratio), "{ratio}");
 }
 

@@ -1,4 +1,4 @@
-//! An operator in state s1 of the thesis, and a prior of changes of the operator.
+//! An operator in state s1 of the thesis, and a prior of changes in the operator.
 
 use hoid_survey::kernel::multiple_model::prior::{ChangePrior, DelayPrior};
 

@@ -1,4 +1,4 @@
-//! Claims that compare batch fits of Box-Jenkins models with m* = m0 and batch fits of ARX models.
+//! Claims that compare batch fits of Box-Jenkins models with m* = m0 with batch fits of ARX models.
 
 use super::{
     claim::{Claim, Source, Theme},

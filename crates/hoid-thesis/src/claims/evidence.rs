@@ -26,7 +26,7 @@ use super::{
     value::Value,
 };
 
-/// Length of the span before the change that gives the initial level, s; `FINAL_SPAN_S` is the length of the span at
+/// Length of the span before the change that gives the initial level (s); `FINAL_SPAN_S` is the length of the span at
 /// the end that gives the final level.
 const INITIAL_SPAN_S: f64 = 10.24;
 

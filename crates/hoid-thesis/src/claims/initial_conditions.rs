@@ -81,7 +81,7 @@ fn fit_query(at: Setting, quantity: &str, nk: usize, start: &str) -> Query {
     at.query(&name_with_f(quantity)).name("BJ").nk(nk).start(start)
 }
 
-/// Bias of the fit from a start minus bias of the fit from the base start, for each replication, percentage points.
+/// Bias of the fit from a start minus bias of the fit from the base start, for each replication, in percentage points.
 fn bias_differences(study: Study<'_>, at: Setting, name: &str, nk: usize, start: &str) -> Result<Vec<f64>, String> {
     let of = |start: &str| study.sample(&fit_query(at, &bias_of(name), nk, start));
     Ok(of(start)?.iter().zip(&of("base")?).map(|(a, b)| a - b).collect())

@@ -9,10 +9,11 @@
 //!      because such an x carries no information about the number. If the number is the size of an effect (slower by a
 //!      factor, less error by a percentage), an x beyond the range on the side of the larger effect *exceeds* the
 //!      claim: the statement is true, and the effect is larger.
-//!    - If less than half of the replications give a value (because models cannot be converted), the cell is undecided.
+//!    - If fewer than half of the replications give a value (because models cannot be converted), the cell is
+//!      undecided.
 //! 2. **A part** of a claim (same figure of merit, same test) *holds* if 90 % of its decided cells pass. A part *holds
 //!    and more so* if fewer cells pass, but 90 % pass or exceed the claim. A part *holds in part* if 50 % of its
-//!    decided cells pass or exceed the claim, and *does not hold* otherwise. If less than half of the cells of a part
+//!    decided cells pass or exceed the claim, and *does not hold* otherwise. If fewer than half of the cells of a part
 //!    are decided, the part is undecided.
 //! 3. **A claim** *holds* if all its parts hold. A claim *holds and more so* if all parts hold and at least one of them
 //!    holds and more so. A claim *does not hold* if no part holds even in part, and *holds in part* otherwise. If no

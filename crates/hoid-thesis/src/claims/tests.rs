@@ -151,7 +151,7 @@ fn verdicts_depend_on_the_data() {
 
 #[test]
 fn traces_give_bias_and_settling() {
-    // RPEM has an error of 3 %, RLS of 40 %.
+    // RPEM has an error of 3 %, and RLS has an error of 40 % if the remnant is of first order.
     let results = synthetic_results("recursive", &|cell, estimator, column, replication| {
         let off = match (estimator.name.as_str(), cell.resolved.scenario().remnant.order) {
             ("RLS", 1) => 0.4,

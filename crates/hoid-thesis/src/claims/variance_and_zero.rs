@@ -164,7 +164,7 @@ fn check_wrong_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     Ok(vec![large, smaller])
 }
 
-/// Relative errors of the zero 1/T_L, %, computed from the relative errors of T_L.
+/// Relative errors of the zero 1/T_L (%), computed from the relative errors of T_L.
 fn zero_errors(t_l_percent: &[f64]) -> Vec<f64> {
     let of = |error: &f64| 100.0 * (1.0 / (1.0 + error / 100.0) - 1.0);
     t_l_percent.iter().map(of).collect()

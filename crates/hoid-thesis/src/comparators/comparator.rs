@@ -28,7 +28,7 @@ pub struct Task<'a> {
     pub requested_samples: &'a [usize],
     /// Frequencies of the lines of the forcing function, rad/s.
     pub lines_rad_s: &'a [f64],
-    /// Frequencies at which the response is requested, rad/s; each is the frequency of a line.
+    /// Frequencies at which the response is requested (rad/s); each is the frequency of a line.
     pub omega_rad_s: &'a [f64],
     /// Span of the start fit, s.
     pub start_s: (f64, f64),
@@ -36,7 +36,7 @@ pub struct Task<'a> {
     pub nk: usize,
     /// A second run of the same person in the same task, if available.
     pub validation: Option<&'a Record>,
-    /// Time (s) and rate (1/s) of the change of the controlled element; `None` if the element is constant.
+    /// Time (s) and rate (1/s) of the change in the controlled element; `None` if the element is constant.
     pub change: Option<(f64, f64)>,
 }
 

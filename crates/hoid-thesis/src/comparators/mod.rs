@@ -16,7 +16,7 @@
 //! | `genetic_sigmoid` | maximum likelihood of a sigmoid by a genetic search |
 //! | `lpv_subspace` | predictor-based subspace identification of an LPV model |
 //! | `rpem_by_vaf` | RPEM whose covariance is updated by the VAF of a validation set (a proposal in section VII) |
-//! | `unit_responses` | the operator's responses to error and error rate with unit gain |
+//! | `unit_responses` | the operator's responses to the error and the error rate with unit gain |
 //! | `least_squares` | normal equations |
 
 mod comparator;

@@ -15,9 +15,9 @@
 //! `g' K^-1 g = sum_i (g_i - g_{i+1})^2/(decay^i - decay^(i+1)) + g_{nb-1}^2/decay^(nb-1)`.
 //!
 //! The recursion is in information form: `R(t) = lambda R(t-1) + phi phi'`, with a corresponding recursion for `phi u`.
-//! These sums stay positive for any excitation; the equations are solved when an estimate is requested. The response is
-//! the Fourier transform of g, `H = sum g_i e^(-j omega i Ts)`. The response has no poles and therefore gives no
-//! operator parameters.
+//! R stays positive semidefinite for any excitation; the equations are solved when an estimate is requested. The
+//! response is the Fourier transform of g, `H = sum g_i e^(-j omega i Ts)`. The response has no poles and therefore
+//! gives no operator parameters.
 
 use hoid_ident::{settings, settings::Bounds};
 use nalgebra::DMatrix;

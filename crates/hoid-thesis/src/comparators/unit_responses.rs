@@ -1,4 +1,4 @@
-//! The operator's responses to error and error rate with unit gain.
+//! The operator's responses to the error and the error rate with unit gain.
 //!
 //! With a known neuromuscular part, `u = K_e y_0 + K_e_dot y_1 + n`. The signal y_0 is the exact response of
 //! `omega^2/(s^2 + 2 zeta omega s + omega^2)` to the held error, delayed by nk - 1 samples, and y_1 is its rate. This

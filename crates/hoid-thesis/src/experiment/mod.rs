@@ -5,11 +5,11 @@
 //! which the last five are evaluated), and to the user's own recordings. For each run ([`procedure`]):
 //!
 //! 1. Batch fits to the first and the last three eighths of the run, [0, 30.72] and [51.20, 81.92] s in the thesis: ARX
-//!    by OLS and BJ(m* = 1) by PEM, with every delay of a range. In each span, the delay with the highest VAF is
+//!    by OLS and BJ(m* = 1) by PEM, with every delay in a range. In each span, the delay with the highest VAF is
 //!    selected. The n_k* of the run and structure is the rounded mean of the two selected delays; T_n* is the mean of
 //!    the remnant time constants of the two fits (the thesis: *the average between the best two sub-batch-fitting
 //!    estimations made*).
-//! 2. With this n_k*, OLS and PEM fits to both spans are repeated.
+//! 2. With this n_k*, the OLS and PEM fits to both spans are repeated.
 //! 3. RLS and RPEM with lambda = 1 - 1/256 and P0 = 0.1 I track the run, starting from the fit of the first span. T_n*
 //!    is only reported in Table 3: d1 is a parameter of RPEM and starts from the value in its fit, as in section V.B.
 //!
@@ -60,7 +60,7 @@ pub struct ExperimentCondition {
 pub struct MeasuredRun {
     /// The measurement; it starts at 0 s.
     pub record: Record,
-    /// Time of a known change of the controlled element, s.
+    /// Time of a known change in the controlled element, s.
     pub change_s: Option<f64>,
 }
 
@@ -94,7 +94,7 @@ pub trait Experiment: Send + Sync {
 pub struct EvaluatedRun {
     /// Identification of the run.
     pub key: RunKey,
-    /// Time of a known change of the controlled element, s.
+    /// Time of a known change in the controlled element, s.
     pub change_s: Option<f64>,
     /// Results for the run.
     pub outcome: RunOutcome,

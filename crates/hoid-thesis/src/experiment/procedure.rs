@@ -55,7 +55,7 @@ pub struct RunOutcome {
     pub nk: [usize; 2],
     /// Selected delay by structure and span, samples.
     pub nk_by_span: [[usize; 2]; 2],
-    /// Time constant T_n* of the Box-Jenkins model, s; NaN if neither span gives one.
+    /// Time constant T_n* of the Box-Jenkins model (s); NaN if neither span gives one.
     pub t_n_s: f64,
     /// Batch fits with the delay n_k*, by structure and span.
     pub batch: [[State; 2]; 2],

@@ -34,7 +34,7 @@ pub struct StudyEntry {
     pub directory: String,
     /// Number of estimates.
     pub estimates: u64,
-    /// Duration, s; `None` if the results already existed.
+    /// Duration (s); `None` if the results already existed.
     pub seconds: Option<f64>,
 }
 

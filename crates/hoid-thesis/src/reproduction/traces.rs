@@ -217,7 +217,7 @@ fn make(
     item.draw(trace_panels, &grid, data)
 }
 
-/// Time from which the estimates determine the range of their panels, s; before this time the estimates are still
+/// Time from which the estimates determine the range of their panels (s); before this time the estimates are still
 /// moving away from their initial values.
 const SETTLED_S: f64 = 15.0;
 

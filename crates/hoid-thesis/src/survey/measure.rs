@@ -28,7 +28,7 @@ const PARAMETER_START_S: f64 = 10.0;
 /// Indices of the evaluated lines of the forcing function.
 pub(super) const LINE_INDICES: Range<usize> = 2..9;
 
-/// Errors of one run, %; NaN if there is no estimate.
+/// Errors of one run (%); NaN if there is no estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Errors {
     /// Errors of the response before, during and after the change.

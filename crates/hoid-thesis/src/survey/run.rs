@@ -221,7 +221,7 @@ method = "fourier"
             own.runs[run].clone().unwrap()
         };
         for run in 0..2 {
-            // The batch fit to the end of the run is correct there, but wrong before the change.
+            // The batch fit to the last 30.72 s is accurate after the change, but wrong before it.
             let [before, _, after] = of("BJ", run).response;
             assert!(after < 10.0 && before > 30.0, "{before} {after}");
             // Fourier coefficients give no parameters.

@@ -1,12 +1,12 @@
 //! Test of whether e responds to u beyond chance.
 //!
-//! In a closed loop the latest u improves the prediction of e from earlier errors and outputs ([`loop_response()`]). The
-//! share of the prediction errors that it explains may be small: the target, which cannot be predicted either, and the
-//! resolution of the recorder also contribute to these errors. The share is therefore compared with chance, the largest
-//! share of [`SHIFT_COUNT`] copies of u that are shifted in time (circularly). A shift keeps the spectrum of u, and with
-//! it what sinusoids common to e and u explain, but removes a response. Jumps of the target are removed from e, which
-//! does not change how e responds to u. The test is done at the rate of the record and, since the mean of a block has
-//! less noise, with means at [`SLOW_RATE_HZ`]; a response at either rate counts.
+//! In a closed loop the latest u improves the prediction of e from earlier errors and outputs ([`loop_response()`]).
+//! The share of the prediction errors that it explains may be small: the target, which cannot be predicted either, and
+//! the resolution of the recorder also contribute to these errors. The share is therefore compared with chance: the
+//! largest share of [`SHIFT_COUNT`] copies of u that are shifted circularly in time. A shift keeps the spectrum of u,
+//! and with it what sinusoids common to e and u explain, but removes a response. Jumps of the target are removed from
+//! e, which does not change how e responds to u. The test is done at the rate of the record and, since the mean of a
+//! block has less noise, with means at [`SLOW_RATE_HZ`]; a response at either rate counts.
 
 use hoid_ident::diagnostics::loop_response;
 use hoid_model::{Finding, Record};
@@ -20,9 +20,10 @@ const SLOW_RATE_HZ: f64 = 12.5;
 const SHIFT_COUNT: usize = 24;
 /// Share that chance does not reach; the copies are not examined for a larger share.
 const CLEAR_SHARE: f64 = 0.2;
-/// Ratio to the share by chance above which e responds to u. For u of another run it is rarely above 1.2.
+/// Ratio to the share by chance above which e is considered to respond to u. For u of another run it is rarely above
+/// 1.2.
 const CHANCE_RATIO: f64 = 1.4;
-/// Longest span that is examined, s: the last one of the record.
+/// Longest span (in s) that is examined, at the end of the record.
 const MAX_SPAN_S: f64 = 120.0;
 /// Second difference of e, in standard deviations, above which it is a jump.
 const JUMP_DEVIATIONS: f64 = 8.0;
@@ -98,7 +99,8 @@ impl Trace {
             "no-answer",
             format!(
                 "e does not respond to u as it would in a closed loop (the latest u explains {:.1} % of the \
-                 innovations of e, and up to {:.1} % by chance): check whether u and e are from the same run",
+                 innovations of e; copies of u that are shifted in time explain up to {:.1} %): check whether u and e \
+                 are from the same run",
                 100.0 * found.own,
                 100.0 * found.chance
             ),

@@ -1,13 +1,13 @@
 //! Names the input whose response changed, for a model with two inputs.
 //!
-//! Rows at distances of at least [`MIN_ROW_DISTANCE_S`] are compared in pairs. With the difference d of a response at a frequency
-//! and the sum C of the covariances of its real and imaginary parts, `T = d' C^-1 d` (A. Wald, 1943) exceeds x with
-//! probability `exp(-x/2)` if nothing changes and the errors of the rows are independent. Rows within the memory of the
-//! recursion have similar errors, so the test then finds less than it could. The probability that the
-//! largest T of an input, over all pairs and frequencies, exceeds a limit is at most that of one comparison times the
-//! number of comparisons (Bonferroni). While the recursion
-//! follows a change of one response, the other may deviate for a few seconds. The T of a pair is therefore the smallest
-//! T of the pair and of the pairs with neighbouring rows: a change must last.
+//! Rows at distances of at least [`MIN_ROW_DISTANCE_S`] are compared in pairs. With the difference d of a response at a
+//! frequency and the sum C of the covariances of its real and imaginary parts, `T = d' C^-1 d` (A. Wald, 1943) exceeds
+//! x with probability `exp(-x/2)` if nothing changes and the errors of the rows are independent. Rows within the memory
+//! of the recursion have similar errors, so the test then has less power. The probability that the largest T of an
+//! input, over all pairs and frequencies, exceeds a limit is at most that of one comparison times the number of
+//! comparisons (Bonferroni). While the recursion follows a change in one response, the other may deviate for a few
+//! seconds. The T of a pair is therefore the smallest T of the pair and of the pairs with neighbouring rows: a change
+//! must last.
 
 use hoid_model::Finding;
 
@@ -22,17 +22,17 @@ use crate::{
 const MIN_ROW_DISTANCE_S: f64 = 10.0;
 /// Largest number of rows that are compared.
 const MAX_ROWS: usize = 16;
-/// Probability, over all comparisons of an input, below which a change is named.
+/// p-value, over all comparisons of an input, below which a change is reported.
 const SIGNIFICANCE_LEVEL: f64 = 0.01;
 
-/// The largest change of a response.
+/// The largest change in a response.
 #[derive(Debug, Clone, Copy)]
 struct LargestChange {
     /// Times of the two rows, s.
     between_s: [f64; 2],
     omega_rad_s: f64,
     responses: [Response; 2],
-    /// Probability of a change at least as large if nothing changes.
+    /// Upper bound on the probability that a statistic at least as large occurs in any comparison if nothing changes.
     p_value: f64,
 }
 
@@ -56,17 +56,17 @@ impl Trace {
                 format!("the response to e changed {own}; the response to {channel} also changed, {further}")
             }
             (Some(own), None) => {
-                format!("the response to e changed {own}; no change of the response to {channel} was found")
+                format!("the response to e changed {own}; no change in the response to {channel} was found")
             }
             (None, Some(further)) => {
-                format!("the response to {channel} changed {further}; no change of the response to e was found")
+                format!("the response to {channel} changed {further}; no change in the response to e was found")
             }
             (None, None) => return None,
         };
         Some(Finding::note("changed-input", message))
     }
 
-    /// Returns the declared changes of the response to e, and those of the response to the further input, as text.
+    /// Returns the declared changes in the response to e, and those of the response to the further input, as text.
     fn declared_input_changes(&self) -> [Option<String>; 2] {
         let text = |of: &dyn Fn(&Change) -> Vec<&'static str>| {
             let each = self.changes().iter().filter_map(|(t, change)| {
@@ -88,7 +88,7 @@ impl Trace {
         ]
     }
 
-    /// Returns the largest change of a response between two of the rows; `None` if no two rows can be compared.
+    /// Returns the largest change in a response between two of the rows; `None` if no two rows can be compared.
     fn largest_change(
         &self,
         rows: &[usize],
@@ -110,7 +110,7 @@ impl Trace {
                 continue;
             }
             for &[from, to] in &pairs {
-                // The neighbours away from the pair, or within it at the ends of the record.
+                // The neighbouring rows outside the pair or, at the ends of the record, within it.
                 let before = from.checked_sub(1).unwrap_or(from + 1);
                 let after = if to < last { to + 1 } else { to - 1 };
                 let lasting = [[from, to], [before, to], [from, after]]

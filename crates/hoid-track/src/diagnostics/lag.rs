@@ -2,8 +2,8 @@
 //!
 //! Gains, poles and delay are tracked, but the lag is not: with a lag of 3 s in the basis, the phase at .5 rad/s of a
 //! person with a lag of 8 s is wrong by about 15 deg. If the response at low frequencies has a lag, the operator of the
-//! form `lag` is therefore fitted to the last [`MAX_SPAN_S`] since the last change, and its response at
-//! [`COMPARED_RAD_S`] is compared with the response of the last row.
+//! form `lag` is therefore fitted to the data since the last change, at most to the last [`MAX_SPAN_S`], and its
+//! response at [`COMPARED_RAD_S`] is compared with the response of the last row.
 
 use hoid_ident::family::FamilyEstimator;
 use hoid_model::{Finding, Form, Record, operator_family::Coordinate};
@@ -15,11 +15,12 @@ pub(crate) const COMPARED_RAD_S: [f64; 2] = [0.5, 1.0];
 /// Longest and shortest span of the batch fit, s.
 const MAX_SPAN_S: f64 = 60.0;
 const MIN_SPAN_S: f64 = 20.0;
-/// Phase without the delay at the first frequency below which the response has a lag, deg.
+/// Phase in deg, at the first frequency and without the contribution of the delay; the response counts as having a lag
+/// if its phase is significantly below this value.
 const LAG_PHASE_DEG: f64 = -15.0;
 /// Difference of the phases that is reported, in standard errors of the batch fit and in deg. If the lag is that of the
-/// person, the variance of the difference is that of the batch fit less that of the trace (J. A. Hausman, *Econometrica*
-/// 46 (1978) 1251-1271).
+/// person, the variance of the difference is that of the batch fit less that of the trace (J. A. Hausman,
+/// *Econometrica* 46 (1978) 1251-1271).
 const MAX_DISTANCE: f64 = 2.0;
 const MAX_DIFFERENCE_DEG: f64 = 5.0;
 /// Smallest and largest lag that the finding proposes, s.
@@ -61,8 +62,9 @@ impl Trace {
         let finding = Finding::warning(
             "held-lag",
             format!(
-                "a lag fitted to the last {:.0} s has a phase of {:.0} deg at {} rad/s, but the last row {:.0} deg: the \
-                 lag T_I, held at {lag_s:.1} s, is not that of the person; use --prior T_I={lag:.1}:0.1",
+                "an operator with a lag, fitted to the last {:.0} s, has a phase of {:.0} deg at {} rad/s, but the \
+                 last row has {:.0} deg: the lag T_I, held at {lag_s:.1} s, is not that of the person; use --prior \
+                 T_I={lag:.1}:0.1",
                 end - from,
                 point.phase_deg.value,
                 point.omega_rad_s,

@@ -29,7 +29,7 @@
 //! | `last-row` | neither K_e nor K_e_dot is determined in the last row, regardless of the other rows |
 //! | `not-followed` | the last 16 or 30 s of the record disagree with the last row |
 //! | `structure` | past errors explain more of u than the operator of the last row does |
-//! | `held-lag` | a lag fitted to the last minute has another phase at low frequencies than the last row |
+//! | `held-lag` | the phase of a lag fitted to the last minute differs at low frequencies from that of the last row |
 //! | `sign` | without a given controlled element: the response at 0.5 rad/s would increase the error |
 //! | `unstable-loop`, `no-crossover` | with the controlled element, a person could not have kept the loop of the last row stable |
 //! | `undeclared-change`, `drifting`, `swaying` | the response varies between declared changes |

@@ -50,7 +50,7 @@ impl Tracker {
         }
     }
 
-    /// True if the model has an input and no coefficient of B is two standard errors from zero.
+    /// True if the model has an input and no coefficient of B is at least two standard errors from zero.
     fn response_is_undetermined(&self) -> bool {
         let (names, estimates) = (self.parameter_names(), self.parameters());
         let mut of_b = names

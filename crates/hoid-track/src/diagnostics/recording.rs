@@ -18,11 +18,11 @@ const HELD_BACK_SHARE: f64 = 0.01;
 const MAX_NAMED_FAULTS: usize = 3;
 /// Lengths of the spans at the end of the record with which the last row is compared, s.
 const LAST_SPANS_S: [f64; 2] = [16.0, 30.0];
-/// Smallest number of declared changes that counts as many, and length of record per change, s, above which the number
-/// does not count as many.
+/// Smallest number of declared changes that counts as many, and the length of record per change (in s) above which the
+/// number does not count as many.
 const MANY_CHANGE_COUNT: usize = 3;
 const RECORD_PER_CHANGE_S: f64 = 30.0;
-/// p-value of one of ten comparisons below which the end of the record differs from the last row.
+/// p-value below which one of ten comparisons counts as a difference between the end of the record and the last row.
 const P_VALUE_LIMIT: f64 = 1e-4;
 
 impl Trace {
@@ -174,7 +174,7 @@ impl Trace {
                 if p_value < P_VALUE_LIMIT && worst.as_ref().is_none_or(|(known, _)| p_value < *known) {
                     let words = format!(
                         "in the last {length:.0} s the data require a {name} that differs from the last row by {}: the \
-                         estimate does not follow a change of the person, or has not recovered; restart it there",
+                         estimate does not follow a change in the person, or has not recovered; restart it there",
                         step.step
                     );
                     worst = Some((p_value, Finding::warning("not-followed", words).over(from, end)));

@@ -15,15 +15,15 @@ use crate::trace::Trace;
 
 /// p-values below which the response is considered to vary within a stretch: by a step, a drift or an oscillation. The
 /// p-values count all frequencies and phases of an oscillation as independent, and take the larger of two variances for
-/// a step: of simulated people who do not change, about 1 % are below each of these limits.
+/// a step; for about 1 % of simulated people who do not change, the p-value is below each of these limits.
 const STEP_P_VALUE: f64 = 0.03;
 const DRIFT_P_VALUE: f64 = 0.01;
 const OSCILLATION_P_VALUE: f64 = 0.05;
-/// Lag of a second basis, s, for people with a long lag, who respond like an integrator. The basis that explains u
+/// Lag of a second basis (in s), for people with a long lag, who respond like an integrator. The basis that explains u
 /// better is used.
 const LONG_LAG_S: f64 = 10.0;
-/// Time excluded at the start of the record and after a faulty span, s: the fast modes of the basis start at rest. The
-/// transient of its lag is estimated.
+/// Time excluded at the start of the record and after a faulty span (in s): the fast modes of the basis start at rest.
+/// The transient of its lag is estimated.
 const SETTLING_S: f64 = 3.0;
 /// Time excluded from the stretches before and after a declared change, s.
 const EXCLUSION_S: f64 = 5.0;

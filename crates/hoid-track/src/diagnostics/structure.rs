@@ -20,7 +20,7 @@ use crate::{
 const P_VALUE_LIMIT: f64 = 1e-3;
 /// p-value above which a corrected lag is considered to explain the residual.
 const LAG_P_VALUE: f64 = 0.02;
-/// Longest span that is examined, s, and the time excluded at its start, s, because the filters start at rest.
+/// Longest span that is examined, and the time excluded at its start because the filters start at rest (both in s).
 const MAX_SPAN_S: f64 = 120.0;
 const SETTLING_S: f64 = 10.0;
 /// Lag of the basis for methods without one, s.
@@ -34,9 +34,9 @@ impl Trace {
             Finding::warning(
                 "structure",
                 format!(
-                    "structure missed: past errors explain more of u than the final operator can with any gains and \
-                     corrections (p = {:.1e}, {:.1} % of the innovations); the estimate is the nearest operator that \
-                     the method can represent",
+                    "past errors explain more of u than the final operator can, with any gains and with corrections of \
+                     its poles, delay and lag (p = {:.1e}, {:.1} % of the innovations); the estimate is the nearest \
+                     operator that the method can represent",
                     found.p_value,
                     100.0 * found.share
                 ),
@@ -67,7 +67,7 @@ impl Trace {
         of(&columns)
     }
 
-    /// Returns the time from which the filters of the basis have settled, s: a settling time after the start of the
+    /// Returns the time from which the filters of the basis have settled (in s): a settling time after the start of the
     /// record or after the last faulty span that is neither an outlier nor a step.
     pub(super) fn settled_from_s(&self, record: &Record, settling_s: f64) -> f64 {
         self.hostile_spans()

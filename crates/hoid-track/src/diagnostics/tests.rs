@@ -22,7 +22,8 @@ fn tracked_verdict(record: &Record, options: &TrackOptions) -> Verdict {
     track(record, options, 10).unwrap().verdict(record, None).unwrap()
 }
 
-/// The recursion of the thesis, without a guard, reported 11.3293 ± .0096 rad/s for a person who had left.
+/// While both signals are constant, a recursion without a guard reports errors that are far too small (such as 11.3293
+/// ± .0096 rad/s), so the verdict contains a warning.
 #[test]
 fn update_at_rest_is_a_warning() {
     let record = simulated_record(Condition::C1);
@@ -79,7 +80,8 @@ fn change() -> crate::Change {
     }
 }
 
-/// An output of zero has no gain: there is no operator, which differs from a doubtful operator.
+/// With an output of zero there is no operator, so the verdict is that nothing is determined, not that the operator is
+/// doubtful.
 #[test]
 fn zero_output_is_not_determined() {
     let record = simulated_record(Condition::C1);
@@ -139,7 +141,7 @@ fn each_defect_of_a_trace_has_its_finding() {
         open(&mut last.k_e_dot);
     });
     assert_eq!(at_the_end, ["last-row"]);
-    // The record has 81.92 s: three changes are many, two are not.
+    // The record is 81.92 s long: three changes are many, two are not.
     for (count, expected) in [(2, vec![]), (3, vec!["many-changes"])] {
         let often = finding_kinds_after(|trace| trace.changes = vec![(40.0, change()); count]);
         assert_eq!(often, expected);
@@ -213,7 +215,7 @@ fn output_of_another_run_is_reported() {
     assert!(!finding_kinds(&tracked_verdict(&record, &typical_options())).contains(&"no-answer"));
 }
 
-/// u is scaled after the simulation, so the loop does not respond to the change of the gain.
+/// u is scaled after the simulation, so the loop does not respond to the change in the gain.
 #[test]
 fn drifting_and_oscillating_gains_are_reported() {
     let record = simulated_record(Condition::C1);

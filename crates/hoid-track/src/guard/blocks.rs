@@ -76,9 +76,10 @@ impl Guard {
         }
     }
 
-    /// Returns the fault, unless it is a misfit that the recursion may still follow. After a change of the person, the
+    /// Returns the fault, unless it is a misfit that the recursion may still follow. After a change in the person, the
     /// model predicts u badly until the recursion has followed the change, and then as well as before; a pause would
-    /// keep the old estimate. A misfit therefore becomes a fault only when it has lasted for [`FOLLOWING_BLOCKS`] more.
+    /// keep the old estimate. A misfit therefore becomes a fault only when it has lasted for [`FOLLOWING_BLOCKS`] more
+    /// blocks.
     fn unless_followed(&mut self, fault: Option<Fault>, block: &Block) -> Option<Fault> {
         let lasts = match fault {
             Some(Fault::Misfit) => true,
@@ -130,7 +131,7 @@ impl Guard {
         self.withdrawn = Some(self.samples - at);
     }
 
-    /// Returns a number of samples of the constant span of a channel; of both channels, the smaller one.
+    /// Returns a number of samples of the constant span of a channel, or the smaller number if both channels are meant.
     pub(super) fn constant_samples(&self, channel: usize, of: impl Fn(&ConstantSpan) -> u64) -> u64 {
         let each = self.constant.get(channel).map(&of);
         each.unwrap_or_else(|| self.constant.iter().map(of).min().unwrap_or(0))
@@ -257,7 +258,7 @@ mod tests {
         (pauses, recursion.updates)
     }
 
-    /// A recursion follows a change of the person within seconds.
+    /// A misfit of a few seconds is not a fault, since a recursion needs this time to follow a change in the person.
     #[test]
     fn short_misfit_is_no_fault() {
         let (none, all) = pauses(0.0);

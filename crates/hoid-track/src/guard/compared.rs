@@ -1,7 +1,7 @@
 //! Schedule of the comparison between the estimate and the start model. To keep the cost low, only the first
 //! [`COMPARED_BLOCKS`] of every [`BLOCKS_PER_ROUND`] blocks are compared; after an unusual block, all of the next
-//! [`BLOCKS_AFTER_UNUSUAL`] blocks are compared. In a round, the first [`SETTLING_BLOCKS`] blocks do not count, because the
-//! filters of the start model start at rest.
+//! [`BLOCKS_AFTER_UNUSUAL`] blocks are compared. In a round, the first [`SETTLING_BLOCKS`] blocks do not count, because
+//! the filters of the start model start at rest.
 
 use hoid_core::{
     delay::DelayLine,

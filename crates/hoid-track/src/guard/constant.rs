@@ -14,7 +14,7 @@ pub(super) struct ConstantSpan {
 hoid_core::state!([] ConstantSpan { last, repeats, end });
 
 impl ConstantSpan {
-    /// Takes a sample, of which there are `samples` so far; spans of `long` samples or more are kept.
+    /// Takes a sample; `samples` is the number of samples so far. Spans of `long` samples or more are kept.
     pub fn update(&mut self, x: f64, tolerance: f64, samples: u64, long: u64) {
         if (x - self.last).abs() <= tolerance {
             self.repeats = self.repeats.saturating_add(1);

@@ -17,7 +17,7 @@ pub enum GuardKind {
     Frozen,
     /// Neither signal moves noticeably.
     Idle,
-    /// e now looks the way u did before, and u the way e did.
+    /// e now resembles the earlier u, and u the earlier e.
     Swapped,
     /// The model predicts u worse than the past of u does.
     Misfit,

@@ -129,8 +129,8 @@ impl Guard {
         for raw in &self.ring[..self.in_ring] {
             let taken = raw.with_values(raw.values);
             // e acts on u only after the delay, so the current innovation does not contain the interpolated e. A tenth
-            // of a second of interpolated u affects an estimate less than it would if a bank created no hypotheses for
-            // that time.
+            // of a second of interpolated u disturbs the estimate less than a bank that created no hypotheses for that
+            // time would.
             outcome = Some(if raw.moves {
                 recursion.step(taken)
             } else {

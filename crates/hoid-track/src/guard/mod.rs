@@ -20,18 +20,18 @@
 //! **Restoring.** The state of a recursion consists of few numbers ([`hoid_core::state`]). It is stored at the start,
 //! when a sample is first held back, and every [`SNAPSHOT_INTERVAL`] blocks without a fault. Of the snapshots after
 //! such blocks, the last two are kept, and the newest one that is older than the time in which the rules detect a fault
-//! is restored. The ring of samples that may have to be taken again is twice [`MAX_HELD_BACK_S`] long, because both signals
-//! may be held back one after the other. Memory is bounded, and nothing is allocated once the snapshots have reached
-//! their size.
+//! is restored. The ring of samples that may have to be taken again is twice [`MAX_HELD_BACK_S`] long, because both
+//! signals may be held back one after the other. Memory is bounded, and nothing is allocated once the snapshots have
+//! reached their size.
 //!
-//! **Misfits.** After a sudden change of the person with little remnant, the old estimate predicts u worse than the
+//! **Misfits.** After a sudden change in the person with little remnant, the old estimate predicts u worse than the
 //! past of u does. A recursion follows such a change within seconds, whereas a pause would keep the old estimate. A
 //! misfit is therefore a fault only if the recursion has not followed it within [`FOLLOWING_BLOCKS`] more blocks, so
 //! that R is at most twice its long-run value again ([`hoid_core::guard::profile`]). The state before the misfit is
 //! then restored.
 //!
-//! **Filters have settled** when the delay and [`SETTLING_S`] have passed: after that time the slowest poles of people's
-//! neuromuscular systems (omega zeta of 2 to 4 rad/s) leave less than 2 %.
+//! **Filters have settled** when the delay and [`SETTLING_S`] have passed: after that time the slowest poles of
+//! people's neuromuscular systems (omega zeta of 2 to 4 rad/s) leave less than 2 %.
 //!
 //! A misfit, exchanged channels or a larger level that last for [`ACCEPTANCE_TIME_S`] are accepted as normal: the
 //! recursion restarts from its start, and the typical levels are estimated again. If the signals then return to their
@@ -88,14 +88,14 @@ const BLOCK_S: f64 = 1.0;
 /// Number of blocks without a fault between two snapshots, and smallest age, in blocks, of a snapshot that is restored.
 const SNAPSHOT_INTERVAL: u32 = 5;
 const MIN_SNAPSHOT_AGE: u64 = 4;
-/// Number of blocks in which the recursion may follow a change of the person before a misfit is a fault.
+/// Number of blocks in which the recursion may follow a change in the person before a misfit is a fault.
 const FOLLOWING_BLOCKS: u32 = 6;
 /// Multiple of the typical mean magnitude beyond which the level of a signal has changed.
 const MAX_LEVEL_RATIO: f64 = 30.0;
 /// Smallest size of an outlier as a multiple of the mean magnitude: e passes a low-pass filter before it reaches an
 /// innovation, while u enters the innovation directly.
 const MIN_OUTLIER_SIZE: [f64; CHANNEL_COUNT] = [0.3, 1e-3];
-/// Shortest pulse of the hand, s, and its largest size as a multiple of the mean magnitude.
+/// Shortest pulse of the hand (in s), and its largest size as a multiple of the mean magnitude.
 const MIN_PULSE_S: f64 = 0.03;
 const MAX_PULSE_SIZE: f64 = 6.0;
 /// Time after which a misfit or swapped channels are accepted as normal, s.

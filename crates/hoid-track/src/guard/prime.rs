@@ -2,9 +2,9 @@
 //!
 //! The typical value of each mean of a block ([`hoid_core::guard::profile`]) is its median over all blocks. The typical
 //! value of each difference is the largest of three estimates of its 99 % quantile: the quantile itself, and the values
-//! that follow from the 50 and 95 % quantiles for Gaussian errors. Neither is affected by a few outliers in the span;
-//! heavy tails are included. Samples at which a signal stays constant are excluded from the quantiles, as during a run
-//! ([`hoid_core::guard::channel`]). Spans in which u rests are learnt too.
+//! that follow from the 50 and 95 % quantiles for Gaussian errors. None of these is affected by a few outliers in the
+//! span; heavy tails are included. Samples at which a signal stays constant are excluded from the quantiles, as during
+//! a run ([`hoid_core::guard::channel`]). Spans in which u rests are learnt too.
 
 use hoid_core::guard::{
     channel::ORDER_COUNT,
@@ -101,7 +101,7 @@ fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
     upper_quantile(&mut values, share).unwrap_or(0.0)
 }
 
-/// Returns for each first difference whether it is larger than for a constant signal.
+/// Returns, for each first difference, whether it is larger than for a constant signal.
 fn moving_differences(signal: &[f64]) -> Vec<bool> {
     let sizes: Vec<f64> = signal.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
     let mean = mean(&sizes);

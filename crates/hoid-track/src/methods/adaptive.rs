@@ -8,8 +8,8 @@
 //! none, some parameters, or an earlier fit, from whose estimate and covariance the recursion starts
 //! (`starting_point`).
 //!
-//! **A further input** has a response with gains and a delay of its own and the neuromuscular system of the response to
-//! e. Its polynomials have the delay of their order; its parameters are K_f, K_f_dot and tau_f.
+//! **A further input** has a response with separate gains and a separate delay, and with the neuromuscular system of
+//! the response to e. Its polynomials have the delay of their order; its parameters are K_f, K_f_dot and tau_f.
 //!
 //! **Reported estimate.** The recursion reports the gain and lead whose response is nearest to the response of the
 //! gains of the basis ([`AdaptiveFilter::operator`]). The polynomials are this operator after a zero-order hold, with

@@ -72,7 +72,7 @@ impl Method {
         &mut *self.0
     }
 
-    /// Returns name, description and options of the method.
+    /// Returns the name, description and options of the method.
     pub fn spec(&self) -> MethodSpec {
         spec(&*self.0)
     }

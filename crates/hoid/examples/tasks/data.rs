@@ -73,7 +73,7 @@ impl TaskData {
 }
 
 impl TaskData {
-    /// Returns input and output of the measurement of a run.
+    /// Returns the input and the output of the measurement of a run.
     pub fn measured_record(&self, run: &Signals) -> Record {
         let from = run.e.len() - self.record.len();
         let channel = |name, values: &[f64]| Channel::new(name, "deg", values[from..].to_vec());

@@ -150,7 +150,7 @@ fn run(task: &str, shared: &TaskData, effort: Effort) -> (f64, Vec<f64>) {
             .map_result(|()| Vec::new())
         }
         "cell" => {
-            // As many runs as there are lanes are computed at a time, in existing memory.
+            // One run per lane is computed at a time, in existing memory.
             let batch_size = InstructionSet::Best.lane_count().unwrap();
             let (mut noises, mut runs) = (vec![shared.noise.clone(); batch_size], Vec::new());
             measure_median(effort, || {
@@ -249,7 +249,7 @@ pub fn rpem(e: &[f64], u: &[f64], history: &mut Vec<[f64; 5]>) -> [f64; 5] {
     *recursion.theta()
 }
 
-/// Returns options of `track` with the same start and memory length.
+/// Returns the options of `track` with the same start and memory length.
 pub fn track_options(method: Method) -> TrackOptions {
     let structure = method.default_structure();
     let start = StartSource::Theta(match method == Method::rls() {

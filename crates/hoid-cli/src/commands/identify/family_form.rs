@@ -51,7 +51,7 @@ impl FamilyReport<'_> {
         Ok(page)
     }
 
-    /// Returns verdict, parameters with their intervals, loop, fit, and the records that were analysed.
+    /// Returns the verdict, the parameters with their intervals, the loop, the fit, and the records that were analysed.
     fn summary(&self, verbose: bool) -> Result<String, CliError> {
         let fit = self.fit;
         let gain = self.records.first().map(GainUnit::of).unwrap_or_default();
@@ -312,8 +312,8 @@ impl FamilyReport<'_> {
         let mut page = String::from("\n");
         if let Some(free) = &fit.free_model {
             page.push_str(&format!(
-                "Box-Jenkins model of the same orders: loss {} (operator: {}), likelihood ratio {:.1} with {} degrees \
-                 of freedom ({}).\n",
+                "Box-Jenkins model of the same orders: loss {} (operator: {}), likelihood-ratio statistic {:.1} with \
+                 {} degrees of freedom ({}).\n",
                 numbers::format_plain(free.loss),
                 numbers::format_plain(fit.loss),
                 free.likelihood_ratio,
@@ -333,7 +333,7 @@ impl FamilyReport<'_> {
         let quality = self.identified.quality()?;
         page.push_str(&format!(
             "VAF prediction {:.2} %, simulation {:.2} %. The simulation VAF carries little information about people, \
-             because an operator with a lag integrates offset and drift of e{}.\n",
+             because an operator with a lag integrates the offset and drift of e{}.\n",
             quality.vaf_prediction,
             quality.vaf_simulation,
             fit.coherent_share.map_or(String::new(), |share| format!(

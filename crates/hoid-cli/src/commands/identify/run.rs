@@ -183,7 +183,7 @@ fn page(found: &PolynomialResult<'_>, verbose: bool) -> String {
     page
 }
 
-/// Returns verdict, parameters with their intervals, fit, and the records that were analysed.
+/// Returns the verdict, the parameters with their intervals, the fit, and the records that were analysed.
 fn summary(found: &PolynomialResult<'_>) -> String {
     let fit = found.fit;
     let gain = found.records.first().map(GainUnit::of).unwrap_or_default();

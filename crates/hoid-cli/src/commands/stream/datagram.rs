@@ -11,10 +11,10 @@
 //!     char magic[4];          /* "hoid" */
 //!     uint32_t sequence;      /* of the sample */
 //!     double t;               /* s */
-//!     double operator_[12];   /* K_e, T_L, K_e_dot, omega_nm, zeta_nm, tau_e, a standard error behind each */
-//!     double open_loop[4];    /* crossover_rad_s, phase_margin_deg, a standard error behind each */
+//!     double operator_[12];   /* K_e, T_L, K_e_dot, omega_nm, zeta_nm, tau_e, each followed by its standard error */
+//!     double open_loop[4];    /* crossover_rad_s, phase_margin_deg, each followed by its standard error */
 //!     double innovation;
-//!     double change_t;        /* when the person changed, where a change was declared since the last */
+//!     double change_t;        /* s; time of a change declared since the last estimate */
 //!     int32_t level;          /* 0 trustworthy, 1 doubtful, 2 not determined */
 //!     uint32_t ready;         /* 1 once there is an estimate */
 //! };

@@ -391,7 +391,7 @@ mod tests {
             (Some(2.0), 0.5, -1.0, Some(7.0))
         );
         assert!(read.fault.is_none());
-        // Cells and objects, in any order.
+        // Cells and JSON objects may follow each other in any order.
         let mut columns = Columns::new("error", "stick", true, 10.0);
         let read = parse_sample(&mut columns, r#"{"stick": "3", "error": null}"#);
         assert!(read.t.is_none() && read.e.is_nan() && read.u == 3.0 && !columns.are_known());

@@ -292,7 +292,7 @@ impl Session {
             && let Some(at) = self.reported_change_s.take()
         {
             self.add_fault(format!(
-                "the change declared at t = {at} s is withdrawn: the guard restored the estimate before the fault"
+                "the change declared at t = {at} s is withdrawn: the guard restored the estimate from before the fault"
             ));
         }
     }

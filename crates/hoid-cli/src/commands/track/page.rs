@@ -222,7 +222,7 @@ fn further_response_table(tracked: &TrackingResult) -> String {
     )
 }
 
-/// Returns crossover and phase margin at the end of the trace; empty without a controlled element.
+/// Returns the crossover and phase margin at the end of the trace; empty without a controlled element.
 fn crossover_text(tracked: &TrackingResult) -> String {
     let (Some(row), Some((rows, reason))) = (tracked.trace.len().checked_sub(1), tracked.rows_without_crossover())
     else {
@@ -244,7 +244,7 @@ fn crossover_text(tracked: &TrackingResult) -> String {
     };
     if let Some(reason) = reason {
         words.push_str(&format!(
-            "{rows} of {} rows have no crossover; mostly because {}.\n",
+            "{rows} of {} rows have no crossover, mostly because {}.\n",
             tracked.trace.len(),
             reason.as_text()
         ));
@@ -301,7 +301,7 @@ fn count_text(tracked: &TrackingResult) -> String {
             tracked.trace.len()
         ));
         text.push_str(&match none.reason {
-            Some(reason) => format!("; mostly because {reason}.\n"),
+            Some(reason) => format!(", mostly because {reason}.\n"),
             None => ".\n".to_owned(),
         });
     }

@@ -193,7 +193,7 @@ pub fn clock_jumps(program: &Path, draw: &mut Draw) -> Outcome {
     outcome
 }
 
-/// Datagrams that are not samples, mixed with samples.
+/// Datagrams that are not samples are dropped and counted; the samples between them are answered.
 pub fn hostile_datagrams(program: &Path, hostile: usize, draw: &mut Draw) -> Outcome {
     let stream = Stream::new(program, SLOW_RATE_HZ, &[]);
     let mut sent = 0;

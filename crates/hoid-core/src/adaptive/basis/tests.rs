@@ -39,7 +39,7 @@ fn filter_output_matches_the_frequency_response() {
             largest = largest.max((x[i] - (h[i][0] * sin + h[i][1] * cos)).abs());
         }
     });
-    // The nearest aliases are those of 2 pi/Ts -+ omega: (omega Ts/2 pi)^2 = 2.3e-5 of the response of the hold, of
+    // The nearest aliases are at 2 pi/Ts -+ omega: each has (omega Ts/2 pi)^2 = 2.3e-5 of the response of the hold, of
     // which the poles transmit .07 for s^2 at 3 rad/s. These two contribute 3.2e-6, the others a fifth of this.
     assert!(largest < 4e-6, "{largest}");
 }
@@ -125,7 +125,7 @@ fn moved_basis_converges_to_a_basis_at_the_new_point() {
             }
         }
     }
-    // The remaining difference is the second-order effect of the change of the delay on the slow mode.
+    // The remaining difference is the second-order effect of the change in the delay on the slow mode.
     assert!(largest < 1e-4 * size, "{largest} of {size}");
     assert!(here.moved(Point { omega: -1.0, ..there }, 0.0).is_none());
     assert!(here.moved(Point { lag: 2.0, ..there }, 0.0).is_none());

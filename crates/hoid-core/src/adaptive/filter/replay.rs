@@ -1,19 +1,19 @@
 //! Replays: a new candidate reads the stored record again and then replaces the live candidate.
 //!
 //! In parallel with the live candidate, a second candidate, the trial, reads the stored record from its start,
-//! [`REPLAY_SAMPLES_PER_STEP`] samples for each new sample, until it has caught up. Its basis is at the current estimate, its
-//! whitening filter is the noise model of the residuals, and its dispersion comes from the innovations of the live
-//! candidate. When the trial has caught up, it becomes the live candidate and the next trial starts. With a delay of a
-//! few seconds, the estimate therefore equals the result of a prediction-error method over all stored data, iterated as
-//! in a Gauss-Newton search (L. Ljung, *System Identification*, 1999, section 10.2), at a bounded cost per sample and
-//! with bit-identical results on every machine.
+//! [`REPLAY_SAMPLES_PER_STEP`] samples for each new sample, until it has caught up. Its basis is at the current
+//! estimate, its whitening filter is the noise model of the residuals, and its dispersion comes from the innovations of
+//! the live candidate. When the trial has caught up, it becomes the live candidate and the next trial starts. With a
+//! delay of a few seconds, the estimate therefore equals the result of a prediction-error method over all stored data,
+//! iterated as in a Gauss-Newton search (L. Ljung, *System Identification*, 1999, section 10.2), at a bounded cost per
+//! sample and with bit-identical results on every machine.
 //!
-//! To escape local minima, every second trial starts from another point. It makes [`STAGE_COUNT`] passes over the record,
-//! each from the result of the previous pass. It replaces the live candidate only if its evidence is better by
+//! To escape local minima, every second trial starts from another point. It makes [`STAGE_COUNT`] passes over the
+//! record, each from the result of the previous pass. It replaces the live candidate only if its evidence is better by
 //! [`TAKEOVER_NATS`].
 //!
-//! If the memory suffices for the longest delay only, there are no replays: the filters keep the basis of the start,
-//! the corrections are added to its point, and the noise model is updated at regular intervals.
+//! If the memory suffices for the longest delay only, there are no replays: the filters keep the initial basis, the
+//! corrections are added to its point, and the noise model is updated at regular intervals.
 
 use core::ops::Range;
 
@@ -57,7 +57,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>, const I: usize, const S: usize, const M: us
             }
             return;
         }
-        // There are more samples than the memory holds only after altered numbers were restored.
+        // n exceeds the capacity of the memory only after altered numbers have been restored.
         let first = n.saturating_sub(self.history.capacity() as u64);
         let mut best: Option<(f64, Candidate<I, S, M, P>)> = None;
         for start in 0..self.prior.starts.len() {
@@ -92,7 +92,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>, const I: usize, const S: usize, const M: us
         -0.5 * each.sum::<f64>()
     }
 
-    /// Starts a trial if none is running. Otherwise continues the trial, and decides about it when it has caught up.
+    /// Starts a trial if none is running. Otherwise continues the trial and, when it has caught up, decides whether it
+    /// replaces the live candidate.
     pub(super) fn replay(&mut self) {
         if self.replay_stage == 0 {
             self.start_replay();

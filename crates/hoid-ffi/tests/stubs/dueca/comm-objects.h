@@ -1,4 +1,4 @@
-// What DUECA makes of the .dco files.
+// The types that DUECA generates from the .dco files.
 struct PersonSample {
     double e = 0, u = 0;
     static const char *name() { return "PersonSample"; }

@@ -1,4 +1,4 @@
-// Runs the module on lines "e,u", as DUECA would: by its functions, in their order.
+// Runs the module on lines "e,u", as DUECA would: it calls the functions of the module in their order.
 #include "../../../examples/dueca/HoidTracker.cxx"
 
 #include <cstdio>

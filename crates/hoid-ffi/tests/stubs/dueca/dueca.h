@@ -1,5 +1,5 @@
-// As much of DUECA's interface as the example uses, written from its documentation: the test compiles
-// the module with it, and hands it samples. It is not DUECA.
+// Substitute for the part of DUECA's interface that the example uses, written from its documentation: the test
+// compiles the module with it, and passes samples to the module. It is not DUECA.
 #ifndef DUECA_STUB_H
 #define DUECA_STUB_H
 

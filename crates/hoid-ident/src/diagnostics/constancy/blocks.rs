@@ -136,7 +136,7 @@ mod tests {
 
     #[test]
     fn block_scores_add_up_for_any_record_length() {
-        // One column, psi = 1: g is the sum of the residuals, G their number.
+        // With one column, psi = 1, g is the sum of the residuals and G is their number.
         for n in [1000_usize, 100_000] {
             let u: Vec<f64> = (0..n).map(|t| (0.1 * t as f64).sin()).collect();
             let data = [Data::new(&u, &u)];

@@ -1,10 +1,10 @@
 //! Test of whether the parameters of a fit are constant, based on the scores over time.
 //!
 //! At the minimum the scores `s(t) = psi(t) eps(t)` sum to zero. If a parameter changes within a record or from one run
-//! to the next, the scores have one sign before the change and the other sign after it (J. Nyblom, *JASA* 84 (1989)
-//! 223-230; B. E. Hansen, *J. Policy Modeling* 14 (1992) 517-533). For a direction v in the space of the parameters and
-//! a set A of samples (the samples of a record after an instant, or one of several runs), the regressor of a change is
-//! `z = psi'v` in A and 0 elsewhere. The part of z that the constant parameters do not explain is
+//! to the next, the scores tend to have one sign before the change and the other sign after it (J. Nyblom, *JASA* 84
+//! (1989) 223-230; B. E. Hansen, *J. Policy Modeling* 14 (1992) 517-533). For a direction v in the space of the
+//! parameters and a set A of samples (the samples of a record after an instant, or one of several runs), the regressor
+//! of a change is `z = psi'v` in A and 0 elsewhere. The part of z that the constant parameters do not explain is
 //!
 //! `r(t) = psi(t)' w(t)`, `w = v - a` in A and `-a` elsewhere, `a = G^-1 G_A v`
 //!
@@ -59,9 +59,9 @@ pub(crate) use search::{Constancy, Direction};
 /// Largest p-value at which a parameter counts as changed, both in the test of the delay and in the test of the other
 /// parameters.
 const SIGNIFICANCE_LEVEL: f64 = 5e-4;
-/// Default relative standard deviation of a person's gain, crossover and delay from run to run. In six cells of ten
-/// runs of three people, each run identified alone, the crossover varied by 13 % in the median after the errors of the
-/// estimates were subtracted (7 to 21 %), and the gain by more (11 to 32 %).
+/// Default relative standard deviation of a person's gain, crossover and delay from run to run. In six sets of ten runs
+/// by three people, with each run identified alone and the variance of the estimates subtracted, the crossover varied
+/// by 7 to 21 % (median 13 %), and the gain by 11 to 32 %.
 pub const RUN_TO_RUN_DEVIATION: f64 = 0.13;
 
 impl Constancy<'_> {

@@ -1,8 +1,8 @@
 //! Test of whether a response is constant: jumps, drifts and periodic changes of its gain and of its delay.
 //!
-//! The response is `u = sum b_i z_i + v` with columns `z_{i+1} = dz_i/dt`. A change of the gain has the direction b; a
-//! change of the delay has the direction `-db/dt`, i.e. `-b_i` at `z_{i+1}`. To first order, an increase of the lead is
-//! equivalent to a decrease of the delay by the same amount. The columns are nearly collinear, so the individual b_i
+//! The response is `u = sum b_i z_i + v` with columns `z_{i+1} = dz_i/dt`. A change in the gain has the direction b; a
+//! change in the delay has the direction `-db/dt`, i.e. `-b_i` at `z_{i+1}`. To first order, an increase in the lead is
+//! equivalent to a decrease in the delay by the same amount. The columns are nearly collinear, so the individual b_i
 //! are too uncertain to define a direction; for the directions, b is a combination of a few terms of a numerator.
 //!
 //! The scores come from least squares with known columns ([`crate::diagnostics::whitened`]); the test is the same as
@@ -23,20 +23,20 @@ use crate::diagnostics::whitened::{NOISE_ORDER, OUTLIER_LIMIT, WhitenedFit, deci
 /// Minimum number of 2 s blocks for the test.
 const MIN_BLOCKS: usize = 8;
 
-/// A change of a response.
+/// A change in a response.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ResponseChange {
     /// Time course of the change.
     pub time_course: TimeCourse,
-    /// Name of the property that changes: `gain` or `delay`. A change of a lead is reported as `delay`.
+    /// Name of the property that changes: `gain` or `delay`. A change in a lead is reported as `delay`.
     pub name: &'static str,
     /// First sample after a jump; 0 for a drift or a periodic change.
     pub first_sample: usize,
     /// Size of the change (amplitude of a periodic change) and its standard error: for the gain as a share of the gain,
     /// for the delay in s.
     pub size: [f64; 2],
-    /// Probability that chance alone gives a change at least as significant, among all candidates with the same kind of
-    /// time course.
+    /// Probability of a change at least as significant among all candidates with the same kind of time course, if the
+    /// response is constant.
     pub p_value: f64,
 }
 
@@ -45,14 +45,14 @@ pub struct ResponseChange {
 pub struct ResponseBasis<'a> {
     /// Signals z_1, z_2, .. that span the response and its corrections; each is the derivative of the one before.
     pub columns: &'a [Vec<f64>],
-    /// Terms of the numerator, each as its coefficients of the signals. The direction of a change of the delay is the
+    /// Terms of the numerator, each as its coefficients of the signals. The direction of a change in the delay is the
     /// derivative of the response, without the derivative of the last signal, which is not available.
     pub terms: &'a [Vec<f64>],
     /// Time constant of the slowest mode, s. The transient of this mode at the start of a stretch is estimated.
     pub lag_s: f64,
 }
 
-/// Returns the most significant jump, drift and periodic change of a response in each of these stretches, and the most
+/// Returns the most significant jump, drift and periodic change in a response in each of these stretches, and the most
 /// significant drift that all stretches have in common. Among several bases, the one that explains u best is used in
 /// each stretch. Stretches with too few data, or in which a value is not a number, are omitted.
 pub fn response_changes(
@@ -303,7 +303,8 @@ mod tests {
 
     #[test]
     fn constant_response_is_not_reported() {
-        // With three time courses and 100 people, each p-value is below its limit in fewer than one in a hundred.
+        // Each of the three p-values is below 0.01 for one person in a hundred at most, so three of 100 people at most
+        // are expected.
         let reported = (0..100)
             .map(|seed| of(1000 + seed, |_| 1.0))
             .filter(|found| found.iter().any(|found| found.p_value < 0.01))

@@ -72,7 +72,7 @@ pub enum TimeCourse {
     Oscillation(f64),
 }
 
-/// A significant change of a parameter.
+/// A significant change in a parameter.
 #[derive(Debug, Clone)]
 pub(super) struct Change {
     pub time_course: TimeCourse,
@@ -148,8 +148,8 @@ pub(super) fn strongest_step(of: &Constancy<'_>, delay: bool) -> Option<Change> 
 }
 
 /// Returns the drift or the periodic change with the smallest p-value within a record: of the delay if `delay` is true,
-/// otherwise of the other parameters. `None` if the change, less two standard errors and times the share of the record
-/// in all data, is smaller than the variation of the parameter between runs.
+/// otherwise of the other parameters. `None` if the change, reduced by two standard errors and multiplied by the share
+/// of the record in all data, is smaller than the variation of the parameter between runs.
 pub(super) fn strongest_course(of: &Constancy<'_>, delay: bool) -> Option<Change> {
     let block_count = |record: usize| of.blocks.iter().filter(|b| b.record == record).count();
     let mut sets = drifts(of.blocks);

@@ -183,7 +183,7 @@ fn change_equals_the_coefficient_of_its_regressor() {
         found.first_sample.abs_diff(2000) <= 200 && found.p_value < 1e-4,
         "{found:?}"
     );
-    // Reference: least squares with the regressor of the change as an additional column.
+    // The reference is least squares with the regressor of the change as an additional column.
     let changed_input: Vec<f64> = (0..4000)
         .map(|t| {
             if t >= found.first_sample {
@@ -217,7 +217,7 @@ fn drifts_and_periodic_changes_are_found_with_their_sizes() {
         (found.size - 1.6).abs() < 3.0 * found.error && found.p_value < SIGNIFICANCE_LEVEL,
         "{found:?}"
     );
-    // Smaller than the variation of people from run to run, which is 6 % here.
+    // This change is smaller than the variation of people from run to run, which is 6 % here.
     let small = Regression::with_course(9, 8000, 0.9, |t| 0.05 * sine(t));
     assert!(small.strongest(strongest_course).is_none());
 }
@@ -244,7 +244,7 @@ fn false_alarm_rate_does_not_exceed_the_level() {
             "memory {memory}: {course}"
         );
         let share = alarms as f64 / f64::from(runs);
-        // The share is 5 % within three standard errors of 1.1 %.
+        // The share is at most 5 %, within three standard errors of 1.1 %.
         assert!(share < 0.05 + 3.0 * 0.011, "memory {memory}: {share}");
     }
 }

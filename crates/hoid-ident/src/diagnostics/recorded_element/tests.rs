@@ -30,7 +30,7 @@ fn simulate_loop(gain: f64, lag: f64, late: usize, recorded: bool, seed: u64) ->
         for (signal, value) in signals.iter_mut().zip([e, u, r, d]) {
             signal.push(value);
         }
-        // Exact for a held input: w' = -lag w + gain v, y' = w.
+        // These steps are exact for a held input: w' = -lag w + gain v, y' = w.
         let v = gain
             * k.checked_sub(late)
                 .map_or(0.0, |k| signals[1][k] + 0.02 * signals[3][k]);
@@ -69,7 +69,7 @@ fn element_of_the_loop_is_found_and_a_wrong_one_rejected() {
             assert_eq!(found.finding(&given).is_none(), found.matches_given());
         }
     }
-    // Elements of other orders: a gain, and an integrator alone.
+    // A given element of another order, an integrator alone, does not match.
     let integrator = ContinuousTransferFunction::new(&[15.0], &[1.0, 0.0]).unwrap();
     assert!(
         !recorded_element(&[simulate_loop(90.0, 6.0, 0, true, 1)], &integrator, None)

@@ -24,8 +24,8 @@ pub(in crate::family) const SIGNIFICANCE_LEVEL: f64 = 0.01;
 /// Cost of each parameter of a form, in units of chi^2.
 const COST_PER_PARAMETER: f64 = 4.0;
 
-/// Returns the probability that the best of `forms` forms reaches at least this likelihood ratio by chance, with `more`
-/// additional parameters.
+/// Returns an upper bound on the probability that the best of `forms` forms, each with `more` additional parameters,
+/// reaches at least this likelihood ratio if there is no response.
 fn chance_probability(ratio: f64, more: usize, forms: usize) -> f64 {
     let chance = ChiSquared::new(more as f64).map_or(1.0, |chi| chi.sf(ratio.max(0.0)));
     (chance * forms as f64).min(1.0)

@@ -71,8 +71,8 @@ fn find_parameter<'p>(parameters: &'p [Parameter], name: &str) -> &'p Parameter 
     parameters.iter().find(|p| p.name == name).unwrap()
 }
 
-/// For these seeds the selected form is the canals, and the parameters agree with the simulated person: within their
-/// errors or, where the search ends at a kink of the direct part and gives no errors, within 15 %.
+/// For these seeds the selected form is the canals, and the parameters agree with those of the simulated person, within
+/// their errors or, where the search ends at a kink of the direct part and gives no errors, within 15 %.
 #[test]
 fn response_of_the_semicircular_canals_is_found() {
     let scenario = task(Some(operator(Form::Canals, &[GAIN], 0.18)), 0.1);

@@ -158,7 +158,8 @@ fn responses_to_error_and_target_are_found() {
     assert!(fit.lines.is_some(), "the lines of d and r");
     let together = |fit: &crate::family::FamilyFit| fit.verdict.findings().iter().any(|f| f.kind == "inputs-together");
     assert!(!together(&fit));
-    // If the target alone excites the loop, the reason is reported.
+    // If the target alone excites the loop, no response to it is found, or a finding reports that the inputs are not
+    // distinguished.
     let undisturbed = Task {
         disturbance: 0.0,
         ..Task::default()
@@ -170,7 +171,7 @@ fn responses_to_error_and_target_are_found() {
         "{:?}",
         alone.channels[0]
     );
-    // With one input the response to e differs, and this is reported.
+    // If the fit has only the input e, the response to r is reported.
     let one = FamilyEstimator {
         channels: Vec::new(),
         forms: vec![Form::Gain],

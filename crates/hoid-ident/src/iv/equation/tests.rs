@@ -23,7 +23,7 @@ const ORDERS: Orders = Orders {
 };
 const SYSTEM: [f64; 4] = [-1.5, 0.7, 1.0, 0.5];
 
-/// Returns input and output of the system, which is not at rest when the record starts.
+/// Returns the input and output of the system, which is not at rest when the record starts.
 fn record() -> (Vec<f64>, Vec<f64>) {
     let x = white_noise(600);
     let mut u = vec![0.0; 600];
@@ -83,8 +83,8 @@ fn each_source_affects_only_its_own_rows() {
         ..Prefilter::default()
     };
     let (a, b) = (split.equation(filter, &SYSTEM), plain.equation(filter, &SYSTEM));
-    // 350 samples in the first record; sample 400 is number 50 of the second. The first row comes after 4 samples, plus
-    // one for D.
+    // The first record has 350 samples; sample 400 is number 50 of the second. The first row comes after 4 samples,
+    // plus one for D.
     let change = (350 - 5) + (50 - 5);
     for (x, y) in a.z.iter().zip(&b.z) {
         assert_eq!(x[..change], y[..change]);

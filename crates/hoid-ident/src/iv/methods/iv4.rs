@@ -8,8 +8,8 @@
 //!
 //! The estimate is consistent for any v, and has the smallest variance if L whitens v. For a closed loop the
 //! simulations use the noise-free input. Ljung uses the order na + nb for L as an example; here the order is four times
-//! as high. If a process is sampled fast, v (`A = F`, `v = F n` with noise n) has zeros near the unit circle, for which
-//! an autoregression needs many terms.
+//! as high. If a process is sampled at a high rate, v (`A = F`, `v = F n` with noise n) has zeros near the unit circle,
+//! for which an autoregression needs many terms.
 
 use hoid_model::Structure;
 

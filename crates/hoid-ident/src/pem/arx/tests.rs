@@ -43,7 +43,7 @@ fn normal_equations_match_qr() {
     let cases = [
         (Condition::C1, orders(2, 2, 29), true),
         (Condition::C4, orders(2, 2, 40), true),
-        // More lags of slow signals are nearly linearly dependent, and QR solves them.
+        // More lags of slow signals are nearly linearly dependent, so QR is used.
         (Condition::C2, orders(5, 4, 20), false),
         (Condition::C1, orders(0, 3, 29), false),
     ];
@@ -88,7 +88,7 @@ fn ill_conditioned_problems_are_solved_by_qr() {
         |o: &Orders, e: &[f64], u: &[f64], first| solve_normal_equations(o, &[Data::new(e, u)], first).is_some();
     let two = orders(1, 1, 1);
     assert!(decide(&two, &e, &u, 2));
-    // Zeros before the record, a constant input, dependent columns, and an exact fit.
+    // QR is required for zeros before the record, a constant input, dependent columns, and an exact fit.
     assert!(!decide(&two, &e, &u, 0));
     assert!(!decide(&two, &vec![0.0; e.len()], &u, 2));
     assert!(!decide(

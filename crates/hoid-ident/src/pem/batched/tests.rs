@@ -121,7 +121,8 @@ fn lane_criterion_matches_a_single_record() {
                 }
             };
             for (i, (a, b)) in all_sums(&found).into_iter().zip(all_sums(&alone)).enumerate() {
-                // Rounding errors of filters with poles near the unit circle, relative to the sizes of the columns.
+                // The tolerance allows for the rounding errors of filters with poles near the unit circle, relative to
+                // the sizes of the columns.
                 assert!(
                     (a - b).abs() <= 1e-11 * size(i),
                     "{o} lane {lane} number {i}: {a} for {b}"

@@ -68,7 +68,8 @@ fn gradient_agrees_with_finite_differences() {
         let mut ws = Workspace::default();
         let exact = c.linearise(&theta, &mut ws);
         for i in 0..theta.len() {
-            // The lag of the canals, 5.9 s, loses further digits by 1/|F(1)|; a larger step loses fewer.
+            // The lag of the canals, 5.9 s, increases the rounding error further by the factor 1/|F(1)|; a larger step
+            // reduces its effect.
             let step = if matches!(layout.form, Form::Canals | Form::CanalsRate) {
                 3e-3
             } else {
@@ -82,8 +83,9 @@ fn gradient_agrees_with_finite_differences() {
             };
             let slope = (8.0 * (at(1.0) - at(-1.0)) - (at(2.0) - at(-2.0))) / (12.0 * h);
             let scale = (exact.gram[i * theta.len() + i] * exact.sum_of_squares).sqrt();
-            // Rounding error divided by h, truncation error h^4. The recursion of three poles near one loses digits by
-            // 1/|F(1)|, 1e5 here: 1e-11 of the loss.
+            // The difference has the rounding error of the loss divided by h, and a truncation error of order h^4. The
+            // recursion with three poles near one amplifies rounding errors by 1/|F(1)|, here 1e5, to 1e-11 of the
+            // loss.
             assert!(
                 (slope + 2.0 * exact.descent[i]).abs() < 1e-7 * scale,
                 "{layout:?} parameter {i}: {slope} and {}",

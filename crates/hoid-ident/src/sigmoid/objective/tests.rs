@@ -11,7 +11,7 @@ const ZETA_INDEX: usize = 7;
 const DELAY_INDEX: usize = 8;
 const NOISE_INDEX: usize = 9;
 
-/// Returns a record with an initial state that is not at rest, a nonzero rate and coloured noise.
+/// Returns a record that does not start from rest: sums of sinusoids, with white noise on u.
 pub(super) fn record(n: usize) -> (Vec<f64>, Vec<f64>) {
     let mut state = 7_u64;
     let mut noise = || {
@@ -72,7 +72,8 @@ fn gradient_agrees_with_finite_differences() {
                 };
                 let slope = (8.0 * (at(1.0) - at(-1.0)) - (at(2.0) - at(-2.0))) / (12.0 * h);
                 let scale = (exact.gram[i * theta.len() + i] * exact.sum_of_squares).sqrt();
-                // Rounding error of 1e-16 of the loss divided by h, truncation error h^4.
+                // The difference has a rounding error of 1e-16 of the loss divided by h, and a truncation error of
+                // order h^4.
                 assert!(
                     (slope + 2.0 * exact.descent[i]).abs() < 1e-8 * scale,
                     "nd {nd} weighted {weighted} level {level} parameter {i}: {slope} and {}",
@@ -106,7 +107,7 @@ fn columns_match_residual_derivatives_except_initial_states() {
         let (up, down) = (at(1.0), at(-1.0));
         let mut difference: Vec<f64> = up.iter().zip(&down).map(|(a, b)| (b - a) / (2.0 * h)).collect();
         let mut column = column;
-        // The change of the basis of the initial states lies within this basis, except for the contribution of the
+        // The change in the basis of the initial states lies within this basis, except for the contribution of the
         // residual at the start.
         project(&mut difference);
         project(&mut column);
@@ -147,7 +148,7 @@ fn initial_state_of_noise_free_data_is_fitted_exactly() {
         "{:e}",
         eps.iter().fold(0.0_f64, |m, x| m.max(x.abs()))
     );
-    // If the state were not estimated, this would be visible.
+    // The response to the initial state is far above rounding, so it must have been estimated.
     assert!(u[300].abs() > 1e-3);
 }
 

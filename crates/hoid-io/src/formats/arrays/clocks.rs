@@ -159,7 +159,7 @@ mod tests {
         assert!(matches!(align(3), Err(IoError::NotIncreasing { .. })));
         assert!(align(4).unwrap().unwrap().rows.is_empty());
         assert!(matches!(align(5), Err(IoError::NoRows { .. })));
-        // The same times in single precision.
+        // The same times in single precision count as equal.
         assert!(align(6).unwrap().is_none() && align(0).unwrap().is_none());
     }
 }

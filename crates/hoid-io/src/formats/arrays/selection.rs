@@ -362,7 +362,7 @@ mod tests {
     use crate::formats::arrays::array::Array;
     use crate::formats::arrays::contents::{Entry, Indexing, Value};
 
-    /// An error and a stick with their own times, and times that no structure of a signal holds.
+    /// Reads e and the stick signals, each structure with its own times; a third structure contains only times.
     fn read(stick_start_s: f64, change: impl Fn(&mut ReadOptions)) -> Result<Table<'static>, IoError> {
         let series = |f: &dyn Fn(f64) -> f64, start_s: f64| {
             let values: Vec<f64> = (0..20).map(|k| f(start_s + 0.1 * f64::from(k))).collect();
@@ -403,7 +403,7 @@ mod tests {
             "{:?}",
             same.notes
         );
-        // The times of the output hold, unless other times are requested.
+        // The times of the output apply, unless other times are requested.
         for time in [None, Some("stick.time"), Some("err.time")] {
             let table = read(0.53, |options| options.time = time.map(|time| time.parse().unwrap())).unwrap();
             let from = if time == Some("err.time") { 0.6 } else { 0.53 };
@@ -420,7 +420,7 @@ mod tests {
             assert!(note.contains("err.time") && note.contains("stick.time"), "{note}");
         }
         assert!(matches!(read(9.0, |_| ()), Err(IoError::NoOverlap { .. })));
-        // With a given sampling frequency, the times in the file do not count.
+        // With a given sampling frequency, the times in the file are ignored.
         let counted = read(0.53, |options| options.sampling_hz = Some(10.0)).unwrap();
         assert_eq!((counted.rows, values(&counted, "e")[1]), (20, 0.1 * 3.0));
         assert!(counted.notes[0].contains("err.signals.e has the times err.time, which differ from stick.time"));

@@ -324,7 +324,7 @@ mod tests {
         file
     }
 
-    /// Six columns at 100 Hz, of which one is a word; times start again after `trial` rows.
+    /// Six columns at 100 Hz, one of which contains words; times start again after `trial` rows.
     fn table_text(rows: usize, trial: usize) -> String {
         let mut text = String::from("# units: e deg\nt,e,word,u,x,n\n");
         for row in 0..rows {
@@ -417,7 +417,7 @@ mod tests {
         assert!(error.to_string().starts_with(words), "{error}");
     }
 
-    /// The size of a sparse file may require more memory for its rows than any computer has.
+    /// The size of a sparse file may suggest more rows than any memory can hold.
     #[cfg(target_os = "linux")]
     #[test]
     fn sparse_file_is_not_read_block_by_block() {

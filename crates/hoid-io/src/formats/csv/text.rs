@@ -73,7 +73,7 @@ pub(super) fn is_unit(text: &str) -> bool {
         && !text.starts_with(|c: char| c.is_ascii_digit() || c == ':')
 }
 
-/// Returns a name in which a line may end as one line.
+/// Returns a name, which may contain line ends, as one line.
 pub(super) fn single_line(name: &str) -> Cow<'_, str> {
     let words = || {
         name.split(['\n', '\r'])

@@ -38,7 +38,7 @@ const SAMPLES_PER_SIDE: usize = 25;
 /// Relative deviation of the sampling rate from the nominal rate above which the deviation is reported.
 const MAX_RATE_DEVIATION: f64 = 0.02;
 
-/// Returns the times of the samples, s.
+/// Returns the times of the samples in s.
 pub(super) fn sample_times(stream: &Stream, notes: &mut Vec<String>) -> Vec<f64> {
     let mut times = stream.stamps.clone();
     if times.is_empty() {
@@ -102,7 +102,7 @@ fn synchronise(times: &mut [f64], offsets: &[(f64, f64)]) -> usize {
     parts.len()
 }
 
-/// Returns for each part between resets of the clock the range of its offsets.
+/// Returns the range of the offsets of each part between resets of the clock.
 fn ranges_between_resets(offsets: &[(f64, f64)]) -> Vec<Range<usize>> {
     if offsets.is_empty() {
         return Vec::new();

@@ -12,7 +12,7 @@ const SIZES: [u64; 3] = [40, 16, 2];
 pub fn bomb(draw: &mut Draw) -> Vec<u8> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/mat/h5py_v73.mat");
     let mut file = fs::read(path).unwrap();
-    // Sizes of arrays are numbers of eight bytes, sizes of chunks are numbers of four bytes.
+    // Sizes of arrays are numbers of eight bytes, and sizes of chunks are numbers of four bytes.
     let width = *draw.one_of(&[8, 8, 4]);
     let small = |at: &usize| {
         let number = file[*at..*at + width]

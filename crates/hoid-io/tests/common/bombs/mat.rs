@@ -52,7 +52,7 @@ fn word(n: u32) -> [u8; 4] {
     n.to_le_bytes()
 }
 
-/// Returns flags, sizes and name of an array.
+/// Returns the flags, the sizes and the name of an array.
 fn array_header(class: u32, sizes: [u32; 2], name: &str) -> Vec<u8> {
     let mut head = [word(6), word(8), word(class), word(0)].concat();
     head.extend([word(5), word(8), word(sizes[0]), word(sizes[1])].concat());

@@ -4,7 +4,7 @@ use super::ratio::Ratio;
 
 pub(super) const EXAMPLES: &str = "write it as 90/(s(s+6)), or as 90/1,6,0 in descending powers of s";
 
-/// Parses numerator and denominator, at least one of which contains commas.
+/// Parses the numerator and the denominator, at least one of which contains commas.
 pub(super) fn coefficients(text: &str) -> Result<Ratio, String> {
     let Some((num, den)) = text.split_once('/') else {
         return Err(format!("it has commas but no '/'; {EXAMPLES}"));

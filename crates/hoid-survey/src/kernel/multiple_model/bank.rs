@@ -1,14 +1,14 @@
-//! The hypotheses with their probabilities, updated with output and signals after the whitening filter.
+//! The hypotheses with their probabilities, updated with the output and the signals after the whitening filter.
 //!
 //! At each sample the probability of a hypothesis is multiplied by its predictive density of the innovation, and the
 //! probabilities are normalised. At every birth the likeliest hypothesis is the parent of new hypotheses:
 //!
-//! - **a change of the gains**, and at every few births also a change of omega_nm and zeta_nm, with the prior
+//! - **a change in the gains**, and at every few births also a change in omega_nm and zeta_nm, with the prior
 //!   probability of such a change since the last birth;
 //! - **a neighbouring delay**, as an alternative that may have been true throughout: the hypothesis is as old as its
 //!   parent, and the variance of each parameter is increased by the error of this parameter that the difference in
 //!   delay causes; the first hypotheses with neighbouring delays are created when the bank starts;
-//! - **a change of the delay**: delays spread over all candidates, with the variances of the gains increased as in any
+//! - **a change in the delay**: delays spread over all candidates, with the variances of the gains increased as in any
 //!   change, and probabilities proportional to the normal density of the step. The set of proposed delays is shifted by
 //!   one each time, so each candidate is proposed in turn, and the number of hypotheses is bounded for any number of
 //!   delays.
@@ -33,7 +33,7 @@ pub struct Bank<const M: usize> {
     /// Number of samples until the next birth.
     samples_until_birth: u32,
     births: u32,
-    /// First sample at which hypotheses of a change of omega_nm and zeta_nm may be created.
+    /// First sample at which hypotheses of a change in omega_nm and zeta_nm may be created.
     neuromuscular_from: u64,
     detector: ChangeDetector,
 }
@@ -107,8 +107,8 @@ impl<const M: usize> Bank<M> {
         Some(bank)
     }
 
-    /// Updates the bank with one sample: output and signals after the whitening filter, or `None` if they are unknown.
-    /// Returns the innovation.
+    /// Updates the bank with one sample: the output and the signals after the whitening filter, or `None` if they are
+    /// unknown. Returns the innovation.
     pub fn update(&mut self, sample: Option<(f64, DelayedSignals<'_>)>, point: [f64; 2]) -> f64 {
         let innovation = self.update_hypotheses(sample, point);
         if self.detector.update(&self.hypotheses, self.samples, &self.prior) {
@@ -117,11 +117,11 @@ impl<const M: usize> Bank<M> {
         innovation
     }
 
-    /// Discards the recent hypotheses of a change of omega_nm and zeta_nm, and allows new ones only after the settling
+    /// Discards the recent hypotheses of a change in omega_nm and zeta_nm, and allows new ones only after the settling
     /// time.
     ///
-    /// A change of the gains passes through the neuromuscular system. Until the transient has settled, the response
-    /// corresponds neither to the old nor to the new gains and could be mistaken for a change of omega_nm and zeta_nm.
+    /// A change in the gains passes through the neuromuscular system. Until the transient has settled, the response
+    /// corresponds neither to the old nor to the new gains and could be mistaken for a change in omega_nm and zeta_nm.
     fn suspend_neuromuscular(&mut self) {
         self.neuromuscular_from = self.samples + self.prior.settling_time;
         let mut rest = 0.0;
@@ -278,8 +278,8 @@ impl<const M: usize> Bank<M> {
         }
     }
 
-    /// Returns the likeliest hypothesis and its slot. Hypotheses of a recent change of omega_nm and zeta_nm are
-    /// excluded, so that the transient effect of a change of the gains on these parameters is not inherited.
+    /// Returns the likeliest hypothesis and its slot. Hypotheses of a recent change in omega_nm and zeta_nm are
+    /// excluded, so that the transient effect of a change in the gains on these parameters is not inherited.
     fn parent_hypothesis(&self) -> Option<(usize, Hypothesis)> {
         let (mut likeliest, mut highest) = (None, 0.0);
         for (slot, h) in self.hypotheses.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Detection of a change of the operator: its time, and the parameters that changed.
+//! Detection of a change in the operator: its time, and the parameters that changed.
 //!
 //! `Lambda = ln((sum of P(h) over hypotheses born within the last T)/(sum of P(h) over older hypotheses))` is the
 //! logarithm of the posterior odds of a change. Lambda corresponds to the likelihood ratio of Willsky and Jones (A. S.
@@ -31,7 +31,7 @@ pub struct Change {
     pub before: Snapshot,
     /// The operator after the change.
     pub after: Snapshot,
-    /// Changes of K_e, K_e_dot, omega_nm, zeta_nm, the innovation variance and the delay, each divided by its standard
+    /// Changes in K_e, K_e_dot, omega_nm, zeta_nm, the innovation variance and the delay, each divided by its standard
     /// error.
     pub z: [f64; PARAMETER_COUNT + 2],
 }
@@ -82,9 +82,9 @@ impl Default for ChangeDetector {
     }
 }
 
-/// Threshold for declaring a change of the delay, in standard errors.
+/// Threshold for declaring a change in the delay, in standard errors.
 const DELAY_THRESHOLD: f64 = 3.0;
-/// Number added to numerator and denominator of the odds to keep Lambda finite.
+/// Number added to the numerator and the denominator of the odds to keep Lambda finite.
 const REGULARISATION: f64 = 1e-12;
 
 impl ChangeDetector {

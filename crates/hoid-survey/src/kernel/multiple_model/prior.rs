@@ -1,14 +1,14 @@
 //! Prior of an operator: rate and size of its changes, and selection of the parameters that change.
 //!
-//! Times are in samples. Changes of the gains are relative to `g = sqrt(K_e^2 + omega_c^2 K_e_dot^2)`, the gain of the
-//! operator's lead term at the crossover frequency omega_c: changes of K_e are in units of g, changes of K_e_dot in
+//! Times are in samples. Changes in the gains are relative to `g = sqrt(K_e^2 + omega_c^2 K_e_dot^2)`, the gain of the
+//! operator's lead term at the crossover frequency omega_c: changes in K_e are in units of g, changes in K_e_dot in
 //! units of `g/omega_c`. The same numbers are therefore valid for an operator of any gain, even if K_e or K_e_dot is
 //! zero.
 
 /// Number of the operator's parameters: K_e, K_e_dot, omega_nm, zeta_nm.
 pub const PARAMETER_COUNT: usize = 4;
 
-/// Prior of changes of the operator.
+/// Prior of changes in the operator.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChangePrior {
     /// Sample time in s.
@@ -21,7 +21,7 @@ pub struct ChangePrior {
     pub hazard: f64,
     /// Number of samples between two births of hypotheses.
     pub birth_interval: u32,
-    /// Standard deviations of a change of K_e and of K_e_dot, relative to g and `g/omega_c`.
+    /// Standard deviations of a change in K_e and in K_e_dot, relative to g and `g/omega_c`.
     pub gain_jump: [f64; 2],
     /// Standard deviation of the drift of each gain in one sample, relative to g and `g/omega_c`.
     pub gain_drift: f64,
@@ -30,11 +30,11 @@ pub struct ChangePrior {
     pub transient_drift: [f64; PARAMETER_COUNT],
     /// Time constant with which the drift after a change decays, samples.
     pub transient_time_constant: f64,
-    /// Standard deviations of a change of omega_nm and of zeta_nm, relative to their values.
+    /// Standard deviations of a change in omega_nm and in zeta_nm, relative to their values.
     pub neuromuscular_jump: [f64; 2],
     /// Interval, in births, between hypotheses in which omega_nm and zeta_nm changed too; zero for no such hypotheses.
     pub neuromuscular_every: u32,
-    /// Odds of a change of all four parameters against a change of the gains alone.
+    /// Odds of a change in all four parameters against a change in the gains alone.
     pub neuromuscular_odds: f64,
     /// Number of residuals to which the innovation variance is reduced just after a change.
     pub residuals_after_change: f64,
@@ -75,9 +75,9 @@ pub struct DelayPrior {
     pub propose_every: u32,
     /// Largest number of changed delays proposed at a time.
     pub proposals: usize,
-    /// Odds of a change of the delay and the gains against a change of the gains alone.
+    /// Odds of a change in the delay and the gains against a change in the gains alone.
     pub change_odds: f64,
-    /// Standard deviation of a change of the delay, samples.
+    /// Standard deviation of a change in the delay, samples.
     pub jump: f64,
     /// Prior probability of a delay that differs by one sample from the likeliest delay.
     pub neighbour_probability: f64,

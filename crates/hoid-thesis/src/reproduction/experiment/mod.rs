@@ -162,7 +162,7 @@ pub(super) fn recorded_items(people: RecordedPeople) -> Vec<Item> {
             format!("Operators before and after ({name})"),
             "Median over the runs of a person. OLS and PEM: batch fits to the first and last three eighths; RLS and \
              RPEM: median over the second half of each of these spans. determined: share of the runs whose model \
-             converts to an operator.",
+             can be converted to an operator.",
         ),
         move |item, runs| tables::operators(item, runs, &conditions),
     ));

@@ -1,4 +1,4 @@
-//! Detectability of a change of the lead within 5 s.
+//! Detectability of a change in the lead within 5 s.
 
 use hoid_report::figures::{Curve, CurveGrid, CurvePanel, LineKind, Shade, curves};
 use hoid_study::Results;

@@ -2,7 +2,8 @@
 //!
 //! **A fit** has coordinates x of an operator Y(x) with covariance C. The recursion has gains theta of the responses
 //! h_i of a basis, which is computed for the delay, the neuromuscular system and the lag of the fit, and corrections of
-//! delay and neuromuscular system. The gains are those whose response is nearest to Y at [`FIT_FREQUENCIES_RAD_S`] rad/s,
+//! delay and neuromuscular system. The gains are those whose response is nearest to Y at [`FIT_FREQUENCIES_RAD_S`]
+//! rad/s,
 //!
 //! `theta = argmin sum_k |(sum_i theta_i h_i(w_k) - Y(w_k))/Y(w_k)|^2`,
 //!
@@ -35,8 +36,8 @@ const LAG_RANGE_S: [f64; 2] = [0.05, 10.0];
 const MAX_MISFIT: f64 = 0.1;
 /// Length of data, in s, that has the same weight as the remnant of a fit.
 const REMNANT_WEIGHT_S: f64 = 20.0;
-/// Longest impulse response of the remnant that is summed, s, and the largest share of the power of an impulse response
-/// in its second half.
+/// Longest impulse response of the remnant that is summed (in s), and the largest share of its power that may be in its
+/// second half.
 const MAX_IMPULSE_RESPONSE_S: f64 = 60.0;
 const MAX_SECOND_HALF_SHARE: f64 = 1e-6;
 /// Prior standard deviation of the level of u, in standard deviations of the remnant.
@@ -222,9 +223,9 @@ struct NearestGains {
 }
 
 impl NearestGains {
-    /// Returns the factor by which the covariance of the state must be increased so that the response is at no
-    /// frequency better known than from the fit. The factor exceeds one because gains with a fixed lag cannot represent
-    /// the uncertainty of the response that an unknown lag causes.
+    /// Returns the factor by which the covariance of the state must be increased so that at no frequency the response
+    /// is known better than from the fit. The factor exceeds one because gains with a fixed lag cannot represent the
+    /// uncertainty of the response that an unknown lag causes.
     fn covariance_factor(
         &self,
         fit: &FittedOperator,
@@ -361,7 +362,7 @@ mod tests {
             (Form::Lead, vec![2.0, 0.4, 2.3, -1.2, 0.18], 0.001),
             (Form::LeadLag, vec![1.4, 0.5, 0.25, 2.4, -1.4, 0.153], 0.01),
             (Form::Lead2Lag, vec![1.4, 0.3, 0.4, 2.4, -1.4, 0.2], 0.01),
-            // Hardly any lag: the basis has the longest lag allowed.
+            // A lag of 50 s, nearly an integration: the basis has the longest lag allowed.
             (Form::LeadLag, vec![1.4, 0.5, 0.02, 2.4, -1.4, 0.2], 0.15),
             (Form::Lag, vec![1.4, 5.0, 2.4, -1.4, 0.2], 0.01),
         ] {

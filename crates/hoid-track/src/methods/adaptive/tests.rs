@@ -41,8 +41,8 @@ fn change_of_the_operator_is_tracked() {
     assert!((last.k_e_dot.value - 0.084).abs() < 0.02, "{last:?}");
 }
 
-/// Ratio of the estimated to the true T_L, from 9 s after a change on, averaged over four runs. A single quotient with
-/// the covariance of all hypotheses gave .76.
+/// The mean ratio of the estimated to the true T_L, from 9 s after a change on and over four runs, is near one. A
+/// single quotient with the covariance of all hypotheses gave .76.
 #[test]
 fn lead_after_a_change_is_unbiased() {
     let simulator = Simulator::new(&Scenario::condition(Condition::C4)).unwrap();

@@ -1,8 +1,8 @@
 //! The runs without faults, and their true values.
 //!
 //! Each case has a run of condition C1 and one of C2 of the thesis, and a virtual person with one to three runs. The
-//! number of the case determines form, remnant, plant and rate, and whether the disturbance was recorded. People who
-//! change (C3 to C6) are omitted, because their true values are not constant.
+//! number of the case determines the form, the remnant, the plant and the rate, and whether the disturbance was
+//! recorded. People who change (C3 to C6) are omitted, because their true values are not constant.
 
 use hoid::{
     model::{FamilyOperator, Form},

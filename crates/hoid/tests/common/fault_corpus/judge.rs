@@ -1,4 +1,4 @@
-//! Judgement of a result, compared with the true values.
+//! Assessment of a result by comparison with the true values.
 //!
 //! The error of a parameter is its distance from the true value in its own standard errors; a delay that is estimated
 //! only in whole samples has a standard error of one sample. A parameter that is reported as not determined, or has no
@@ -7,8 +7,7 @@
 //! A trace is wrong if it is wrong at its last row or [`RECOVERY_CHECK_S`] after the fault. Its recovery time is the
 //! time from the end of the fault to the last row in which a parameter differs by more than [`MAX_RECOVERED_ERRORS`] of
 //! its standard errors and by more than [`MAX_RECOVERED_RELATIVE_ERROR`] of its true value. Its lasting error is the
-//! largest error that it had for
-//! [`MIN_LASTING_S`] without interruption.
+//! largest error that it had for [`MIN_LASTING_S`] without interruption.
 
 use serde_json::Value;
 
@@ -32,14 +31,14 @@ pub struct CaseTruth {
     pub truth: Truth,
     /// True values after the fault, if another person acts from then on.
     pub then: Option<Truth>,
-    /// Span of the fault, s; `None` in a clean run.
+    /// Span of the fault (s); `None` in a clean run.
     pub span_s: Option<(f64, f64)>,
     /// Name of the file with the fault.
     pub file: String,
     pub sample_time: f64,
 }
 
-/// The judgement of one result.
+/// The assessment of one result.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct CaseOutcome {
     /// The parameter with the largest error, and its error in standard errors.
@@ -54,7 +53,7 @@ pub struct CaseOutcome {
     /// Number of reported faults; `placed` is true if one of them is at the right place.
     pub told: usize,
     pub placed: bool,
-    /// For traces: time until the trace stayed near the true values, s; infinite if it never did.
+    /// For traces: time until the trace stayed near the true values (s); infinite if it never did.
     pub recovery_s: Option<f64>,
     /// For traces: the largest lasting error, in standard errors.
     pub lasting: Option<f64>,

@@ -31,7 +31,7 @@ pub enum Change {
     Missing,
     /// 360 deg is added for some seconds.
     Wrap,
-    /// A lasting change of the level, in percent of the standard deviation.
+    /// A lasting change in the level, in percent of the standard deviation.
     Step,
     /// A level of the whole record, in percent of the standard deviation.
     Offset,

@@ -16,7 +16,7 @@
 //! | `kinds` | the faults: kinds, sizes, places, and the order of the cases |
 //! | `inject` | insertion of each fault into a recording |
 //! | `bases` | the runs without faults, and their true values |
-//! | `judge` | judgement of a result, compared with the true values |
+//! | `judge` | assessment of a result by comparison with the true values |
 //! | `program` | runs of the program on a case |
 //! | `summary` | shares over cases, as tables |
 

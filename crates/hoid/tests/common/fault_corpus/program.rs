@@ -62,8 +62,8 @@ impl EvaluationMethod {
         !matches!(self, Self::GreyBox | Self::BoxJenkins)
     }
 
-    /// Returns the methods for a run. The grey box represents all operators, the other methods a gain with a lead; for
-    /// people, only the three methods intended for people are used.
+    /// Returns the methods for a run. The grey box represents all operators, and the other methods represent a gain
+    /// with a lead; for people, only the three methods intended for people are used.
     pub fn of(base: &Base) -> &'static [Self] {
         const METHODS_FOR_LEAD: [EvaluationMethod; 4] = [
             EvaluationMethod::GreyBox,
@@ -162,7 +162,7 @@ fn write_case(
     Ok((files.into_iter().map(|(file, _)| file).collect(), known))
 }
 
-/// Returns the judgement, or the message of the program if there is no result.
+/// Returns the assessment, or the message of the program if there is no result.
 fn run(
     program: &Path,
     way: EvaluationMethod,

@@ -10,7 +10,7 @@ use hoid::{
 
 use super::people::{Cell, Spread, simulate_person};
 
-/// Frequencies at which the response is compared, rad/s: the band of manual control.
+/// Frequencies at which the response is compared (rad/s): the band of manual control.
 const BAND_RAD_S: [f64; 5] = [0.7, 1.3, 2.4, 4.3, 8.0];
 
 /// Variant of a fit.

@@ -2,8 +2,8 @@
 //!
 //! The first rows are the first [`MIN_ROWS`] lines with equal numbers of cells, more than half of which are numbers or
 //! clock times. The header is the line of words above them, or a comment directly above them; a line further up with
-//! equally many words takes precedence if it has the requested columns, or else names of error and control or of a
-//! time. The header must name the cells unambiguously ([`super::names`]).
+//! equally many words takes precedence if it has the requested columns, or else names of the error and the control, or
+//! of a time. The header must name the cells unambiguously ([`super::names`]).
 
 use std::borrow::Cow;
 
@@ -84,7 +84,7 @@ impl<'a> Layout<'a> {
             .map(|(layout, _)| layout)
     }
 
-    /// Finds the structure for a given mark; the second value is true if the first rows hold values only.
+    /// Finds the structure for a given separator; the second value is true if the first rows contain only values.
     fn with_separator(
         text: &'a str,
         filled: &[(usize, &'a str)],

@@ -15,7 +15,7 @@ pub(in crate::formats::csv) enum Separator {
 }
 
 impl Separator {
-    /// All marks; if several fit a table equally well, the first one is used.
+    /// All separators; if several fit a table equally well, the first one is used.
     pub(super) const ALL: [Self; 4] = [Self::Char('\t'), Self::Char(';'), Self::Char(','), Self::Blanks];
 
     fn is_at(self, character: char) -> bool {
