@@ -19,7 +19,7 @@ use hoid_ident::{
     family::{ChannelRole, SeenChannel},
     frequency::{Excitation as Lines, LineDetectionOptions},
 };
-use hoid_model::{Channel, Finding, Record, Verdict};
+use hoid_model::{Channel, Finding, Record, Verdict, numbers::format_p_value};
 use serde_json::{Map, Value, json};
 
 use crate::{AnalysisError, Excitation, Identification, IdentifiedModel, Recordings, json};
@@ -227,11 +227,11 @@ impl Axis {
             .iter()
             .filter(|coupling| coupling.responds)
             .map(|coupling| {
-                let chance = coupling.p_value.as_ref().map_or(1.0, |p| *p);
+                let chance = format_p_value(coupling.p_value.as_ref().map_or(1.0, |p| *p));
                 Finding::note(
                     "axis-coupling",
                     format!(
-                        "{} responds to {} as well (p = {chance:.0e}): the axes are coupled",
+                        "{} responds to {} as well ({chance}): the axes are coupled",
                         self.pair.output, coupling.input
                     ),
                 )

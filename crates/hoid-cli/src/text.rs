@@ -183,15 +183,6 @@ pub fn instability(fit: &Fit) -> &'static str {
     }
 }
 
-/// Formats a p-value as a relation such as `p = 0.03`, so that it is never rounded to 0 or 1.
-pub fn format_p_value(p: f64) -> String {
-    match p {
-        p if p > 0.99 => "p > 0.99".to_owned(),
-        p if p < 0.01 => format!("p = {p:.0e}"),
-        p => format!("p = {p:.2}"),
-    }
-}
-
 /// Describes in one line the share of u that the model explains.
 pub fn fit_line(fit: &Fit, q: &GoodnessOfFit) -> String {
     if fit.model().structure().has_input() {

@@ -76,6 +76,19 @@ pub fn count_with_noun<N: PartialEq + From<u8> + fmt::Display>(n: N, noun: &str)
     }
 }
 
+/// Smallest p-value that is printed as a number; a distribution has no meaning so far in its tail.
+const MIN_P_VALUE: f64 = 1e-16;
+
+/// Formats a p-value as a relation such as `p = 0.03`, so that it is never rounded to 0 or 1.
+pub fn format_p_value(p: f64) -> String {
+    match p {
+        p if p > 0.99 => "p > 0.99".to_owned(),
+        p if p < MIN_P_VALUE => format!("p < {MIN_P_VALUE:.0e}"),
+        p if p < 0.01 => format!("p = {p:.0e}"),
+        p => format!("p = {p:.2}"),
+    }
+}
+
 /// Returns a number without a standard error, with five significant digits; a dash for non-finite values.
 pub fn format_plain(value: f64) -> String {
     format_significant(value, DIGITS_WITHOUT_ERROR)

@@ -2,10 +2,9 @@
 //!
 //! A person who sees the target follows it even without an error: a fit with one input then finds neither the response
 //! to the error nor the loop that the person closes ([`crate::family::SeenChannel`]). Each channel with the name of a
-//! target is tried as a second input, as a gain and with its derivatives, in addition to the form of the fit. A warning
-//! is raised if the best of these models explains far more than chance and its response to the target is not small
-//! compared with the response to the error. A form or a noise model that is slightly wrong also looks like a response to
-//! the target; such a response is small, and so is its effect on the result.
+//! target is tried as a second input, as a gain and with its derivatives, in addition to the forms of the fit. A warning
+//! is raised if the best of these models explains far more than chance. The operator may take each form that has a
+//! weight in the averages: a form that differs slightly from the person would look like a response to the target.
 //!
 //! **Sticks with a dead zone.** If only the target excites the loop, the part of e that follows the target is larger
 //! than the rest of e. A dead zone has different gains for small and for large signals (the describing function of A.
@@ -13,14 +12,12 @@
 //! follows the target differs from the gain for the rest of e, which looks like a response to the target. If u
 //! [rests](StickRest) like the signal of such a stick, the finding is a note with both explanations.
 
-use std::f64::consts::TAU;
-
-use hoid_model::{Finding, Form, Record};
+use hoid_model::{Finding, Form, Record, numbers::format_p_value};
 
 use crate::{
     family::{ChannelFit, ChannelRole, FamilyEstimator, FamilyFit, SeenChannel},
     faults::StickRest,
-    frequency::{COMMON_EXCITATIONS, spectrum},
+    frequency::COMMON_EXCITATIONS,
 };
 
 /// Names of channels that may hold a displayed target.
@@ -29,11 +26,6 @@ pub(super) const TARGET_CHANNELS: [&str; 4] = ["r", "f_t", "target", "reference"
 /// separate lines, the second if only the target excites the loop: in that case an error in the form of the fit looks
 /// like a response to the target.
 const P_VALUE_LIMITS: [f64; 2] = [1e-2, 1e-7];
-/// Smallest RMS of the response to a target for a warning, relative to the RMS of the response to the error. A smaller
-/// response changes the ratio of u to e at the lines of the target by less than this share.
-const MIN_RESPONSE_SHARE: f64 = 0.1;
-/// Lowest and highest frequency of the two RMS values, rad/s.
-const BAND_RAD_S: [f64; 2] = [0.3, 12.0];
 
 /// Returns a finding for each recorded target to which u responds.
 pub fn family_findings(estimator: &FamilyEstimator, fit: &FamilyFit, records: &[Record]) -> Vec<Finding> {
@@ -46,10 +38,8 @@ pub fn family_findings(estimator: &FamilyEstimator, fit: &FamilyFit, records: &[
             SeenChannel::new(name, ChannelRole::Feedforward),
         )?;
         let chance = found.p_value;
-        (chance < P_VALUE_LIMITS[usize::from(!apart)]).then(|| {
-            let is_small = response_share(fit, &found, records).is_some_and(|share| share < MIN_RESPONSE_SHARE);
-            response_finding(name, chance, is_small, !apart && has_rest(records))
-        })
+        (chance < P_VALUE_LIMITS[usize::from(!apart)])
+            .then(|| response_finding(name, chance, !apart && has_rest(records)))
     };
     TARGET_CHANNELS
         .into_iter()
@@ -58,7 +48,7 @@ pub fn family_findings(estimator: &FamilyEstimator, fit: &FamilyFit, records: &[
         .collect()
 }
 
-/// Returns the response to a channel in addition to the inputs of a fit, with the form and the noise orders of the fit,
+/// Returns the response to a channel in addition to the inputs of a fit, with the forms and the noise orders of the fit,
 /// and whether the excitation lines distinguish the channel from e. `None` if the fit has little noise or several
 /// inputs. A channel that cannot be an input, such as a constant channel, also gives `None`: it is no evidence against
 /// the fit.
@@ -77,7 +67,7 @@ pub fn response_to(
     let is_common = |name: &String| *name == channel.name || COMMON_EXCITATIONS.contains(&name.as_str());
     let again = FamilyEstimator {
         excitation: estimator.excitation.clone().filter(|name| !is_common(name)),
-        forms: vec![fit.form],
+        forms: fit.weighed.iter().map(|form| form.form).collect(),
         nc: nc..=nc,
         nd: Some(nd..=nd),
         intersample: fit.intersample,
@@ -90,47 +80,18 @@ pub fn response_to(
     again.test_response(records, channel).ok()
 }
 
-/// Returns the RMS of the response to a channel relative to the RMS of the response to the error, over all records;
-/// `None` if no response was found.
-fn response_share(fit: &FamilyFit, found: &ChannelFit, records: &[Record]) -> Option<f64> {
-    let to_channel = &found.response.as_ref()?.operator;
-    let [mut of_channel, mut of_error] = [0.0; 2];
-    for (k, record) in records.iter().enumerate() {
-        let [r, e] = [record.other_channel(&found.name)?, record.input()].map(spectrum::coefficients);
-        let of_bin = TAU / (record.len() as f64 * record.sample_time().s());
-        let to_error = &fit.operator(k).operator;
-        for (bin, (r, e)) in r.iter().zip(&e).enumerate() {
-            let omega = bin as f64 * of_bin;
-            if (BAND_RAD_S[0]..=BAND_RAD_S[1]).contains(&omega) {
-                of_channel += (to_channel.response(omega) * r).norm_sqr();
-                of_error += (to_error.response(omega) * e).norm_sqr();
-            }
-        }
-    }
-    Some((of_channel / of_error).sqrt())
-}
-
 /// True if u of one of the records rests like the signal of a stick with a dead zone.
 fn has_rest(records: &[Record]) -> bool {
     records.iter().any(|record| StickRest::of(record.output()).is_some())
 }
 
-fn response_finding(name: &str, chance: f64, is_small: bool, nonlinear: bool) -> Finding {
-    if is_small {
-        return Finding::note(
-            "other-input",
-            format!(
-                "a response of u to {name} explains the record slightly better (p = {chance:.0e}), but it is less than \
-                 {:.0} % of the response to the error; if the person saw {name}, add --input {name}",
-                100.0 * MIN_RESPONSE_SHARE
-            ),
-        );
-    }
+fn response_finding(name: &str, p_value: f64, nonlinear: bool) -> Finding {
+    let chance = format_p_value(p_value);
     if nonlinear {
         return Finding::note(
             "other-input",
             format!(
-                "u follows {name} more closely than the response to the error explains (p = {chance:.0e}): a stick \
+                "u follows {name} more closely than the response to the error explains ({chance}): a stick \
                  with a dead zone can cause this; if the person saw {name}, add --input {name}"
             ),
         );
@@ -138,7 +99,7 @@ fn response_finding(name: &str, chance: f64, is_small: bool, nonlinear: bool) ->
     Finding::warning(
         "other-input",
         format!(
-            "u responds to {name} as well as to the error (p = {chance:.0e}): with one input, the response to the \
+            "u responds to {name} as well as to the error ({chance}): with one input, the response to the \
              error, the crossover and the margins are wrong; add --input {name}"
         ),
     )

@@ -92,11 +92,7 @@ impl Trace {
         if rows.iter().all(|row| self.is_before_first_estimate(*row)) {
             all.push(Finding::undetermined(
                 "no-estimate",
-                format!(
-                    "there is no estimate in the {:.2} s of the record (the first one comes after about 1 s); give a \
-                     longer record",
-                    record.time_s(record.len()) - record.time_s(0)
-                ),
+                self.missing_estimate_message(record),
             ));
             return Ok(Verdict::of(all));
         }
@@ -221,6 +217,24 @@ impl Trace {
                 "the standard error of {name} grows to {ratio:.0} times its median: for a while the data carry too little information{remedy}"
             ),
         ))
+    }
+
+    /// Returns the reason why there is no estimate in the whole record, with its remedy.
+    fn missing_estimate_message(&self, record: &Record) -> String {
+        let duration_s = record.time_s(record.len()) - record.time_s(0);
+        let start = format!("there is no estimate in the {duration_s:.2} s of the record");
+        let is_constant = |values: &[f64]| values.iter().all(|v| *v == values[0]);
+        let (skipped, samples) = (self.counts().skipped, self.counts().samples);
+        if let Some(constant) = record.channels().take(2).find(|channel| is_constant(&channel.values)) {
+            format!("{start}: {} is constant; check --input and --output", constant.name)
+        } else if 2 * skipped > samples {
+            format!(
+                "{start}: {skipped} of {samples} samples were skipped for a fault in e or u; inspect the recording, \
+                 or raise --largest if its values are correct"
+            )
+        } else {
+            format!("{start} (the first one comes after about 1 s); give a longer record")
+        }
     }
 
     fn count_findings(&self) -> Vec<Finding> {

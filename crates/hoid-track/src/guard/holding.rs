@@ -3,7 +3,7 @@
 use hoid_core::guard::profile::CHANNEL_COUNT;
 
 use super::{
-    Guard, GuardDecision, MAX_PULSE_SIZE, RawSample,
+    Guard, GuardDecision, MAX_PULSE_SIZE, RawSample, STEP_TO_LEVEL_RATIO,
     event::{GuardAction, GuardKind},
 };
 use crate::recursion::{Recursion, Sample};
@@ -36,7 +36,7 @@ impl Guard {
             } else if held > 0 && channel.has_returned(x[c]) {
                 let (size, largest_move) = (channel.largest_held_error(), channel.jump_threshold());
                 channel.resume(x[c]);
-                if c == 1 && self.is_pulse(place, held, size, x[c], largest_move) {
+                if self.is_tracking(c, place, held, size, x[c], largest_move) {
                     let first = place.saturating_sub(held as usize);
                     self.ring[first..place].iter_mut().for_each(|raw| raw.held[c] = false);
                     continue;
@@ -79,16 +79,17 @@ impl Guard {
         }
     }
 
-    /// True if a movement of the hand can explain an excursion of u that ends with sample x at index `place` of the
-    /// ring: such an excursion starts with a jump and returns over several samples.
-    fn is_pulse(&self, place: usize, held: u32, size: f64, x: f64, largest_move: f64) -> bool {
-        let Some(last) = place.checked_sub(1).map(|k| self.ring[k].values[1]) else {
+    /// True if tracking can explain an excursion of a signal that ends with sample x at index `place` of the ring: it
+    /// starts with a jump and does not end with one. In e this is a step of the target, in u a movement of the hand,
+    /// which returns over several samples.
+    fn is_tracking(&self, c: usize, place: usize, held: u32, size: f64, x: f64, largest_move: f64) -> bool {
+        let Some(last) = place.checked_sub(1).map(|k| self.ring[k].values[c]) else {
             return false;
         };
-        held >= self.shortest_pulse
-            && size <= MAX_PULSE_SIZE * self.profile.typical_values().magnitude[1]
-            && (x - last).abs() <= largest_move
-            && (x - last).abs() <= 0.5 * size
+        let ends_smoothly = (x - last).abs() <= largest_move && (x - last).abs() <= 0.5 * size;
+        let is_pulse =
+            held >= self.shortest_pulse && size <= MAX_PULSE_SIZE * self.profile.typical_values().magnitude[1];
+        ends_smoothly && (c == 0 || is_pulse)
     }
 
     /// Handles the return of both signals. The recursion takes the samples again from the start of the excursion.
@@ -152,7 +153,22 @@ impl Guard {
             self.start_pause(GuardKind::Missing, c, held, 0.0);
             return self.process_paused(recursion, sample);
         }
-        if self.is_too_large(c, x[c]) {
+        // A step of the target moves e at once, after which e varies as before; the person responds only after the
+        // delay.
+        let ring = &self.ring[..self.in_ring];
+        // The number of held-back samples exceeds that in the ring only if the saved numbers were altered.
+        let first = self.in_ring.saturating_sub(held as usize);
+        let is_target = c == 0
+            && !ring.iter().any(|raw| raw.held[1])
+            && self.channels_before[0].moves_typically(ring[first..].iter().map(|raw| raw.values[0]));
+        // Between rare steps of the target, both signals are small, so a step and the response to it may exceed the
+        // largest level of continuous tracking.
+        let margin = if is_target || self.samples < self.response_until {
+            STEP_TO_LEVEL_RATIO
+        } else {
+            1.0
+        };
+        if self.is_larger(c, x[c], margin) {
             self.start_pause(GuardKind::Level, c, held, x[c].abs());
             return self.process_paused(recursion, sample);
         }
@@ -165,7 +181,7 @@ impl Guard {
             let RawSample { values, moves, .. } = raw;
             let mut sound = [true; CHANNEL_COUNT];
             for i in 0..CHANNEL_COUNT {
-                sound[i] = values[i].is_finite() && !self.is_too_large(i, values[i]);
+                sound[i] = values[i].is_finite() && !self.is_larger(i, values[i], margin);
                 if sound[i] {
                     last[i] = values[i];
                     let errors = self.channels[i].errors(values[i]);
@@ -182,16 +198,10 @@ impl Guard {
                 [_, false] => recursion.bridge(taken),
             }
         }
-        // A step of the target moves e at once, after which e varies as before; the person responds only after the
-        // delay.
-        let ring = &self.ring[..self.in_ring];
-        // The number of held-back samples exceeds that in the ring only if the saved numbers were altered.
-        let first = self.in_ring.saturating_sub(held as usize);
-        let behind = ring[first..].iter().map(|raw| raw.values[0]);
-        let is_target =
-            c == 0 && !ring.iter().any(|raw| raw.held[1]) && self.channels_before[0].moves_typically(behind);
         self.in_ring = 0;
-        if !is_target {
+        if is_target {
+            self.response_until = self.samples + self.settling_samples;
+        } else {
             self.report(GuardKind::Step, c, held, size, GuardAction::Accepted, 0);
         }
         GuardDecision { outcome, held: false }

@@ -12,10 +12,12 @@
 //!
 //! **Steps and pulses.** `e = r - y`: a step of the target moves e by the same amount within one sample, while y and u
 //! continue smoothly, since the person responds only after the delay. A lasting jump of e, after which e moves as
-//! before while u continues as predicted, is therefore tracking and is not reported. A disturbed sensor recovers as
-//! fast as it failed: an excursion that ends with a jump is an outlier. A fast hand leaves a dead zone at once but
-//! returns over several samples: an excursion of u of [`MIN_PULSE_S`] or more within [`MAX_PULSE_SIZE`] times its mean
-//! magnitude, whose last step is within the normal moves of u, is a pulse and is used as recorded.
+//! before while u continues as predicted, is therefore tracking and is not reported, up to [`STEP_TO_LEVEL_RATIO`]
+//! times the largest level. The same limit applies to both signals while the person responds to the step. A disturbed
+//! sensor recovers as fast as it failed: an excursion that ends with a jump is an outlier; one of e that ends without
+//! a jump is a small step of the target. A fast hand leaves a dead zone at once but returns over several samples: an
+//! excursion of u of [`MIN_PULSE_S`] or more within [`MAX_PULSE_SIZE`] times its mean magnitude, whose last step is
+//! within the normal moves of u, is a pulse and is used as recorded.
 //!
 //! **Restoring.** The state of a recursion consists of few numbers ([`hoid_core::state`]). It is stored at the start,
 //! when a sample is first held back, and every [`SNAPSHOT_INTERVAL`] blocks without a fault. Of the snapshots after
@@ -92,6 +94,8 @@ const MIN_SNAPSHOT_AGE: u64 = 4;
 const FOLLOWING_BLOCKS: u32 = 6;
 /// Multiple of the typical mean magnitude beyond which the level of a signal has changed.
 const MAX_LEVEL_RATIO: f64 = 30.0;
+/// Ratio of the largest step of a target to the largest level of a signal.
+const STEP_TO_LEVEL_RATIO: f64 = 10.0;
 /// Smallest size of an outlier as a multiple of the mean magnitude: e passes a low-pass filter before it reaches an
 /// innovation, while u enters the innovation directly.
 const MIN_OUTLIER_SIZE: [f64; CHANNEL_COUNT] = [0.3, 1e-3];
@@ -192,6 +196,8 @@ pub(crate) struct Guard {
     restarts: u64,
     /// Sample number of the last restart.
     restarted_at: u64,
+    /// Sample number until which the person responds to the last step of the target.
+    response_until: u64,
     event: Option<GuardEvent>,
     /// Number of samples since the state that was restored at the last sample.
     withdrawn: Option<u64>,
@@ -224,6 +230,7 @@ impl State for Guard {
                 &mut self.pause,
                 &mut self.restarts,
                 &mut self.restarted_at,
+                &mut self.response_until,
                 &mut self.constant,
             ],
             each,
@@ -238,6 +245,7 @@ impl State for Guard {
         self.pause.good = self.pause.good.min(self.samples);
         self.sound_at = self.sound_at.map(|at| at.min(self.samples));
         self.restarted_at = self.restarted_at.min(self.samples);
+        self.response_until = (self.response_until).min(self.samples.saturating_add(self.settling_samples));
         self.pause.kind = self.pause.kind.min(GuardKind::ALL.len());
         self.pause.channel = self.pause.channel.min(GuardChannel::ALL.len() - 1);
     }
@@ -282,6 +290,7 @@ impl Guard {
             pause: Pause::default(),
             restarts: 0,
             restarted_at: 0,
+            response_until: 0,
             event: None,
             withdrawn: None,
             constant: [ConstantSpan::default(); CHANNEL_COUNT],

@@ -9,8 +9,9 @@ use super::{
 use crate::recursion::{Recursion, Sample};
 
 impl Guard {
-    pub(super) fn is_too_large(&self, c: usize, x: f64) -> bool {
-        (x - self.centre[c]).abs() > self.largest[c]
+    /// True if a sample is farther from the centre than `margin` times the largest level of its signal.
+    pub(super) fn is_larger(&self, c: usize, x: f64, margin: f64) -> bool {
+        (x - self.centre[c]).abs() > margin * self.largest[c]
     }
 
     /// Starts a pause.
@@ -40,7 +41,7 @@ impl Guard {
         let mut errors = [[0.0; 4]; CHANNEL_COUNT];
         for c in 0..CHANNEL_COUNT {
             let x = values[c];
-            good[c] = x.is_finite() && !self.is_too_large(c, x);
+            good[c] = x.is_finite() && !self.is_larger(c, x, 1.0);
             if x.abs() > self.pause.size && self.pause.kind() == GuardKind::Level {
                 self.pause.size = x.abs();
             }

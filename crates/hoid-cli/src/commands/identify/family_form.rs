@@ -7,7 +7,10 @@ use hoid::ident::{
     validation::GoodnessOfFit,
 };
 use hoid::model::{ContinuousTransferFunction, GainUnit, Record, uncertainty::Estimate};
-use hoid::report::{numbers, operator_sentence, undetermined_remark};
+use hoid::report::{
+    numbers::{self, format_p_value},
+    operator_sentence, undetermined_remark,
+};
 
 use crate::{error::CliError, text};
 
@@ -111,7 +114,7 @@ impl FamilyReport<'_> {
             match &channel.response {
                 None => page.push_str(&format!(
                     "No response to {name} ({role}) was found ({} for the best of {} forms).\n",
-                    text::format_p_value(channel.p_value),
+                    format_p_value(channel.p_value),
                     channel.forms.len() - 1
                 )),
                 Some(of) => {
@@ -294,14 +297,14 @@ impl FamilyReport<'_> {
                     "{} and {} {}",
                     pair.methods.0.phrase(),
                     pair.methods.1.phrase(),
-                    text::format_p_value(pair.p_value)
+                    format_p_value(pair.p_value)
                 )
             });
             page.push_str(&format!(
                 "Agreement of the methods over {} that the data determine: {}; all together {}.\n",
                 numbers::count_with_noun(agreement.rows.len(), "coordinate"),
                 pairs.collect::<Vec<_>>().join(", "),
-                text::format_p_value(agreement.p_value)
+                format_p_value(agreement.p_value)
             ));
         }
         page
@@ -318,7 +321,7 @@ impl FamilyReport<'_> {
                 numbers::format_plain(fit.loss),
                 free.likelihood_ratio,
                 free.degrees_of_freedom,
-                text::format_p_value(free.p_value)
+                format_p_value(free.p_value)
             ));
         }
         let clusters = match fit.cluster_kind {

@@ -9,7 +9,7 @@ use crate::linalg::{
 };
 
 /// Scan of the delay of the element, s: smallest delay, largest delay, step.
-const DELAY_SCAN_S: (f64, f64, f64) = (-0.05, 0.3, 0.01);
+const DELAY_SCAN_S: (f64, f64, f64) = (-0.5, 0.3, 0.01);
 /// Half width of the smoothing window of the residual spectrum, in natural logarithms of the frequency.
 const SMOOTHING_HALF_WIDTH: f64 = 0.35;
 /// Number of iterations in which the weights are computed.
