@@ -182,7 +182,7 @@ impl Guard {
                 [_, false] => recursion.bridge(taken),
             }
         }
-        // A step of the target moves e at once, after which e varies as before; the person responds only after the
+        // A step in the target moves e at once, after which e varies as before; the person responds only after the
         // delay.
         let ring = &self.ring[..self.in_ring];
         // The number of held-back samples exceeds that in the ring only if the saved numbers were altered.

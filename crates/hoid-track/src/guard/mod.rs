@@ -10,7 +10,7 @@
 //! | frozen, idle, larger or rescaled, swapped, misfit (tested in blocks of a second) | the samples, for the filters only | restored to a state before the fault | the estimate is updated again once the span is over and the filters have settled |
 //! | an estimate that has diverged according to [`hoid_core::guard::reference`] | the samples, for the filters only | restored to the start | the estimate is updated again once the filters have settled |
 //!
-//! **Steps and pulses.** `e = r - y`: a step of the target moves e by the same amount within one sample, while y and u
+//! **Steps and pulses.** `e = r - y`: a step in the target moves e by the same amount within one sample, while y and u
 //! continue smoothly, since the person responds only after the delay. A lasting jump of e, after which e moves as
 //! before while u continues as predicted, is therefore tracking and is not reported. A disturbed sensor recovers as
 //! fast as it failed: an excursion that ends with a jump is an outlier. A fast hand leaves a dead zone at once but
