@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 
 use hoid_ident::{
     MarginEstimates,
-    frequency::{Description, DescriptionOptions, describe_runs},
+    frequency::{Description, RecordDescriptionOptions, describe_runs},
 };
 use hoid_io::Offset;
 use hoid_model::{Decimation, FaultHandling};
@@ -32,7 +32,7 @@ use crate::{
 pub struct DescribingFunctionOptions {
     /// Excitation, lines, period, controlled element and span. The offset given here, in samples of the recordings, is
     /// added to the offsets of the channels.
-    pub options: DescriptionOptions,
+    pub options: RecordDescriptionOptions,
     /// Offsets that were not removed in reading, with the names of their channels as keys.
     pub offsets: BTreeMap<String, Offset>,
     /// Treatment of faults of the recordings.
@@ -71,7 +71,7 @@ impl DescribingFunctionOptions {
         let late = self.options.offset_samples + output_delay_samples(first, &self.offsets)?;
         let late_s = late * first.sample_time().s();
         let data = read.at_rate(self.rate, false)?;
-        let options = DescriptionOptions {
+        let options = RecordDescriptionOptions {
             offset_samples: (late_s + data.input_lead_s()) / data.records[0].sample_time().s(),
             ..self.options.clone()
         };

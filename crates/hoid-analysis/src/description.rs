@@ -2,7 +2,7 @@
 
 use hoid_ident::{
     IdentError,
-    frequency::{Description, DescriptionOptions, describe_runs},
+    frequency::{Description, RecordDescriptionOptions, describe_runs},
 };
 use hoid_io::Step;
 use hoid_model::{Detrend, FaultHandling};
@@ -29,7 +29,7 @@ pub enum Excitation {
 }
 
 impl Excitation {
-    /// Interprets the text of the user: a channel or `none`; without a text the channel is found automatically.
+    /// Interprets the text of the user: a channel or `none`; without text the channel is found automatically.
     pub fn from_text(text: Option<&str>) -> Self {
         match text {
             None => Self::Found,
@@ -63,13 +63,13 @@ impl Recordings {
         if *excitation == Excitation::Nothing {
             return Ok(None);
         }
-        let options = |offset_samples| DescriptionOptions {
+        let options = |offset_samples| RecordDescriptionOptions {
             excitation: excitation.channel_name().map(str::to_owned),
             period_s,
             offset_samples,
             // Detrending, if requested, has already been applied in reading.
             detrend: Detrend::None,
-            ..DescriptionOptions::default()
+            ..RecordDescriptionOptions::default()
         };
         let steps = || self.accounts.iter().flat_map(|account| &account.steps);
         let is_cut = |step: &Step| matches!(step, Step::Offset { cut_samples, .. } if *cut_samples != (0, 0));

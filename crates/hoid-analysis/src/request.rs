@@ -19,7 +19,7 @@ use crate::{
     registry::{CHANGE, OPERATOR, PEM, REMNANT, estimators},
 };
 
-/// Request for a model, in the form of names and texts.
+/// Request for a model, in the form of names and strings.
 #[derive(Debug, Clone, Default)]
 pub struct Request {
     /// Name of the structure.

@@ -219,7 +219,10 @@ impl SeveralInputsResult {
             if gains.clone().count() > 0 && gains.clone().all(|(_, e)| open(&e)) {
                 findings.push(Finding::warning(
                     "undetermined-input",
-                    format!("no coefficient of {name} differs from zero by two standard errors: the response to {name} is not determined"),
+                    format!(
+                        "no coefficient of {name} differs from zero by at least two standard errors: the response to \
+                         {name} is not determined"
+                    ),
                 ));
             }
         }

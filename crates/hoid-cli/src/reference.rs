@@ -117,7 +117,7 @@ fn quoted(words: &[&str]) -> String {
         .join(", ")
 }
 
-/// Wraps a text into lines of at most 96 columns, each indented by `indent`.
+/// Wraps text into lines of at most 96 columns, each indented by `indent`.
 fn wrapped(text: &str, indent: &str) -> String {
     let mut lines = vec![indent.to_owned()];
     for word in text.split_whitespace() {

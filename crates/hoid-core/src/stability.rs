@@ -1,4 +1,4 @@
-//! Test whether all roots of a monic polynomial lie inside a circle.
+//! Tests whether all roots of a monic polynomial lie inside a circle.
 //!
 //! The Schur-Cohn test uses the step-down (Levinson) recursion: with `k = d_n`, the polynomial of degree n has its
 //! roots inside the unit circle if and only if `|k| < 1` and the polynomial of degree n - 1 with coefficients

@@ -98,7 +98,7 @@ pub(crate) fn panic_message(panic: &(dyn Any + Send)) -> String {
     let words = (panic.downcast_ref::<&str>().copied())
         .or_else(|| panic.downcast_ref::<String>().map(String::as_str))
         .unwrap_or("it gave no message");
-    format!("an internal error of hoid; please report it: {words}")
+    format!("internal error in hoid; please report it: {words}")
 }
 
 fn store_error(text: &str) {

@@ -1,4 +1,4 @@
-//! Test of inputs for linear dependence.
+//! Tests inputs for linear dependence.
 
 use crate::{IdentError, linalg::vectors::dot};
 

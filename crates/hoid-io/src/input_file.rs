@@ -1,4 +1,4 @@
-//! Reading of whole files that are not recordings (texts, settings of limited length, bytes), and the file names in a
+//! Reading of whole files that are not recordings (text, settings of limited length, bytes), and the file names in a
 //! directory.
 
 use std::fs;

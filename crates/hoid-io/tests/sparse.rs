@@ -43,7 +43,7 @@ fn sparse_values_are_held() {
     }
     assert_eq!(
         read.notes,
-        ["1 row at the start and 1 at the end cut: a sparse column has no values there"]
+        ["1 row at the start and 1 at the end were cut: a sparse column has no values there"]
     );
     let [
         Step::Sparse {

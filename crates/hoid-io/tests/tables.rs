@@ -333,7 +333,7 @@ fn pyarrow_files_are_read() {
     }
 }
 
-/// `read_table` reads the values in the same way; kinds and empty texts are specific to it.
+/// `read_table` reads the values in the same way; kinds and empty text cells are specific to it.
 #[test]
 fn pyarrow_column_kinds_are_read() {
     let table = read_table(&fixture("kinds")).unwrap();

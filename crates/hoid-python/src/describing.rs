@@ -2,8 +2,8 @@
 
 use hoid_analysis::{DescribingFunctionOptions, DescribingFunctionResult, Recordings};
 use hoid_ident::frequency::{
-    Averaging, DescribingFunction, DescribingOptions, DescriptionOptions, Excitation, GainLeadDelayOptions,
-    LineDetectionOptions, LineWeights, Realisation, describe as describe_lines,
+    Averaging, DescribingFunction, DescribingOptions, Excitation, GainLeadDelayOptions, LineDetectionOptions,
+    LineWeights, Realisation, RecordDescriptionOptions, describe as describe_lines,
 };
 use hoid_model::{FaultHandling, uncertainty::Estimate};
 use numpy::{Complex64, PyArray1};
@@ -48,7 +48,7 @@ pub fn describe<'py>(
 ) -> Outcome<PyDescription> {
     let records = arrays::records(&records, ChannelSelection::All)?;
     let describing = DescribingFunctionOptions {
-        options: DescriptionOptions {
+        options: RecordDescriptionOptions {
             excitation,
             lines_rad_s: lines,
             period_s: period,

@@ -23,8 +23,8 @@ pub(crate) fn render(name: &str, values: Value) -> Result<String, ReportError> {
     render_with(&[], name, values)
 }
 
-/// Renders a template of this crate or one of `own`, the names and texts of additional templates. Additional templates
-/// can use the parts and the style of the templates of this crate.
+/// Renders a template of this crate or one of `own`, the names and contents of additional templates. Additional
+/// templates can use the parts and the style of the templates of this crate.
 ///
 /// # Errors
 /// [`ReportError::Template`] if the template cannot be rendered.

@@ -187,7 +187,7 @@ mod tests {
     fn deviates_match_the_library() {
         let edges = edges();
         assert!(edges.windows(2).all(|pair| pair[0] > pair[1]), "{edges:?}");
-        // Many thousands of the deviates are not accepted directly, and some hundreds are in the tail.
+        // Many thousands of the deviates are not accepted directly, and several hundred are in the tail.
         let mut found = vec![0.0; 1_000_003];
         normal_deviates(ChaCha8Rng::from_seed([3; 32]), &mut found);
         let mut alone = ChaCha8Rng::from_seed([3; 32]);

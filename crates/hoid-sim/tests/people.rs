@@ -75,7 +75,7 @@ fn runs_are_repeatable_and_follow_the_controlled_element() {
 #[test]
 fn run_to_run_spread_has_the_requested_size() {
     let task = Task {
-        between_runs: 0.05,
+        spread_between_runs: 0.05,
         ..Task::default()
     };
     let draw = |task: &Task| {
@@ -179,7 +179,7 @@ fn ranges_without_people_are_refused() {
         assert!(matches!(draw(bad), SimError::Model(_)), "{bad:?}");
     }
     let spread = Task {
-        between_runs: -0.1,
+        spread_between_runs: -0.1,
         ..Task::default()
     };
     assert!(Person::draw(&typical, &spread, Plant::Integrator, None, kind, 1, 1).is_err());
@@ -194,7 +194,7 @@ fn people_respond_to_a_displayed_target() {
             let task = Task {
                 display,
                 preview_s: 0.5,
-                between_runs: 0.05,
+                spread_between_runs: 0.05,
                 ..Task::default()
             };
             let draw =

@@ -52,7 +52,7 @@ impl Rows {
         }
     }
 
-    /// Starts a row in which texts are empty, real numbers are NaN, and whole numbers are zero.
+    /// Starts a row in which strings are empty, real numbers are NaN, and whole numbers are zero.
     pub fn start_row(&mut self) {
         self.rows += 1;
         for column in &mut self.columns {

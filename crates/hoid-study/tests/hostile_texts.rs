@@ -1,5 +1,5 @@
-//! Modified texts of study plans, group manifests and scenarios are read, or rejected with a message that names the
-//! file, without a panic. Accepted data can be read again.
+//! Modified study plans, group manifests and scenarios are either read or rejected with a message that names the file;
+//! none of them causes a panic. Accepted data can be read again.
 #![allow(clippy::unwrap_used)]
 
 use std::{fs, path::Path};
@@ -90,7 +90,7 @@ const CHARACTERS: [char; 14] = [
     '[', ']', '{', '}', '"', '\'', '=', '.', ',', '#', '\n', '\0', '\u{1b}', '\u{fffd}',
 ];
 
-/// A modification of a text.
+/// A modification of the text.
 #[derive(Debug, Clone)]
 enum Change {
     Value(Index, Index),

@@ -162,11 +162,7 @@ fn options_of_an_operator_are_checked() {
             18,
             "structure has no effect here",
         ),
-        (
-            "method = \"operator\"\norders.nf = 2",
-            18,
-            "only the orders nc and nd of the noise",
-        ),
+        ("method = \"operator\"\norders.nf = 2", 18, "expected nc or nd"),
         ("method = \"operator\"\norders.nd = 65", 18, "within 0..64"),
         ("method = \"operator\"\norders.nd = \"4..1\"", 18, "as \"0..8\""),
         ("method = \"operator\"\nprior = \"fit.json\"", 18, "is a file"),
@@ -185,7 +181,7 @@ fn options_of_an_operator_are_checked() {
         (
             "method = \"time-varying\"\nfix = { zeta = 0.3 }",
             18,
-            "has zeta, expected one of K_e1",
+            "names the parameter zeta, expected one of K_e1",
         ),
         (
             "method = \"sriv\"\nform = \"lead\"",

@@ -6,7 +6,7 @@ mod common;
 use std::{fs, path::Path};
 
 use common::{reals, texts};
-use hoid_ident::frequency::{DescriptionOptions, describe_runs};
+use hoid_ident::frequency::{RecordDescriptionOptions, describe_runs};
 use hoid_io::{ReadOptions, read_record, read_table};
 use hoid_model::{Record, SampleTime};
 use hoid_sim::people::{Plant, RemnantKind};
@@ -83,11 +83,11 @@ fn group_at_1000_hz_matches_100_hz() {
         })
         .collect();
     let (_, condition_settings) = manifest.conditions.iter().next().unwrap();
-    let options = DescriptionOptions {
+    let options = RecordDescriptionOptions {
         excitation: condition_settings.excitation.clone(),
         period_s: condition_settings.period_s,
         offset_samples: condition_settings.offset_samples,
-        ..DescriptionOptions::default()
+        ..RecordDescriptionOptions::default()
     };
     let expected = describe_runs(&whole, &options).unwrap();
     let lines = read_table(&out.join("describing-functions.parquet")).unwrap();

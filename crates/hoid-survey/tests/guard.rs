@@ -80,7 +80,7 @@ fn permanent_jump_leaves_the_result_unchanged_after_the_wait() {
             let (e, u) = (record.input()[k] + jump, record.output()[k]);
             let found = with.step(e, u);
             let plain = without.step(e, u);
-            // A step of the target is not reported.
+            // A step in the target is not reported.
             assert_eq!(with.event(), None);
             if found.held {
                 accepted = k + 1;

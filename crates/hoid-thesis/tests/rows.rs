@@ -33,7 +33,7 @@ fn row_count(cell: &str) -> usize {
     numbers.split(", ").map(of).sum()
 }
 
-/// Returns the texts between backticks, with ranges expanded.
+/// Returns the names between backticks, with ranges expanded.
 fn quoted_names(cell: &str) -> Vec<String> {
     let parts: Vec<&str> = cell.split('`').collect();
     let mut names = Vec::new();

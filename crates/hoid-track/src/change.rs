@@ -49,7 +49,7 @@ pub struct FurtherChange {
     pub operators: [FurtherOperator; 2],
     /// Changes of K_f, K_f_dot and tau_f, each divided by its standard error.
     pub z: [f64; 3],
-    /// True if the response changed, even if no single quantity changed by two standard errors.
+    /// True if the response changed, even if no single quantity changed by more than two standard errors.
     pub is_changed: bool,
 }
 

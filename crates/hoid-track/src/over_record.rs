@@ -47,7 +47,7 @@ pub(crate) fn track_with(
     start: Option<&Fit>,
     each: &mut dyn FnMut(&mut Tracker, usize),
 ) -> Result<Trace, IdentError> {
-    trace::check_every(every)?;
+    trace::check_row_interval(every)?;
     options.check()?;
     let sample_time = record.sample_time();
     if options.structure.has_input() && record.input_channel().is_none() {

@@ -19,7 +19,7 @@ pub type ChooseOptions<'a> = &'a dyn Fn(&Record) -> Result<(TrackOptions, Option
 const RETRY_DIVISOR: usize = 4;
 /// Maximum number of samples that an extended warm-up keeps, as a multiple of the length of the warm-up.
 const MAX_KEPT_LENGTHS: usize = 2;
-/// Index, in the numbers of a saved warm-up, of the number of kept samples.
+/// Position of the number of kept samples among the numbers of a saved warm-up.
 const COUNT_INDEX: usize = 4;
 /// Longest run of faulty samples within a warm-up (in s); after a longer one the warm-up restarts.
 const LONGEST_FAULT_S: f64 = 1.0;

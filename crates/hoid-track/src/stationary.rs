@@ -34,14 +34,15 @@ use crate::{
 
 /// Share of its typical size within which a signal is stationary.
 const STATIONARY_SHARE: f64 = 0.02;
-/// Shortest stationary spans (in s) of both signals and of one signal that carry no information, and the smallest
-/// number of samples in a stationary span.
+/// Shortest stationary span of both signals that carries no information (in s).
 pub(crate) const MIN_STATIONARY_BOTH_S: f64 = 1.0;
+/// Shortest stationary span of one signal that carries no information (in s).
 const MIN_STATIONARY_ONE_S: f64 = 5.0;
+/// Smallest number of samples in a stationary span.
 const MIN_SAMPLES: u64 = 20;
-/// Number of blocks after which the typical size of a signal is known, and largest number of blocks over which the size
-/// is averaged.
+/// Number of blocks after which the typical size of a signal is known.
 const MIN_BLOCKS: u32 = 10;
+/// Largest number of blocks over which the typical size is averaged.
 const MAX_AVERAGED_BLOCKS: u32 = 60;
 /// Largest number of samples between two stored states.
 const MAX_STATE_AGE_SAMPLES: u64 = 1 << 17;

@@ -579,7 +579,7 @@ fn causal_mean(values: &[f64], width: usize, rows: usize) -> Vec<f64> {
 }
 
 /// Checks that the number of samples between two rows is at least one.
-pub(crate) fn check_every(every: usize) -> Result<(), IdentError> {
+pub(crate) fn check_row_interval(every: usize) -> Result<(), IdentError> {
     if every > 0 {
         return Ok(());
     }

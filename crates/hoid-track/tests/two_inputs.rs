@@ -98,7 +98,7 @@ fn orders(na: usize, nd: usize, nf: usize) -> Orders {
     }
 }
 
-/// Returns the options of a Box-Jenkins model for the prediction-error method.
+/// Returns the options for tracking a Box-Jenkins model with the recursive prediction error method.
 fn box_jenkins() -> TrackOptions {
     TrackOptions {
         further: input(1, 2, NK_R),

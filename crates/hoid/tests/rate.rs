@@ -4,7 +4,7 @@
 use hoid::{
     ident::{
         GreyBox,
-        frequency::{DescriptionOptions, describe_runs},
+        frequency::{RecordDescriptionOptions, describe_runs},
     },
     model::{Decimation, remnant_gain::NoiseDefinition, scenario::RemnantStrength},
     prelude::*,
@@ -54,10 +54,10 @@ fn decimation_keeps_the_delay() {
 fn decimation_keeps_the_describing_function() {
     let whole = run(1000.0, 0.1, 3);
     let of = |record: &Record, offset_samples: f64| {
-        let options = DescriptionOptions {
+        let options = RecordDescriptionOptions {
             excitation: Some("f_t".to_owned()),
             offset_samples,
-            ..DescriptionOptions::default()
+            ..RecordDescriptionOptions::default()
         };
         describe_runs(std::slice::from_ref(record), &options).unwrap()
     };

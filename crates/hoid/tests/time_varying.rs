@@ -348,7 +348,7 @@ fn residuals_and_simulation_match_the_fit() {
         .map(|((u, w), n)| (u - w - n).powi(2))
         .sum();
     let noise: f64 = n.iter().map(|n| n * n).sum();
-    // The 9 parameters fit part of the slow noise, which has some hundred independent values.
+    // The 9 parameters fit part of the slow noise, which has a few hundred independent values.
     assert!(left < 0.1 * noise, "{left} {noise}");
     let levels = quick_estimator()
         .fit(single_record(record))

@@ -2,9 +2,9 @@
 //!
 //! The numbers outside the state in the JSON object are meant for people and other programs; a model contains more
 //! (covariances of quantities that are not printed, states, fixed parameters). The complete state is written as TOML,
-//! which can represent infinity and NaN, whereas JSON cannot, and is stored as one text in the JSON object;
+//! which can represent infinity and NaN, whereas JSON cannot, and is stored as one string in the JSON object;
 //! floating-point numbers are written with enough digits to restore every bit. The first eight bytes of its SHA-256
-//! hash precede the text, so a text that was truncated or edited by hand is rejected. The hash protects against damage,
+//! hash precede the text, so text that was truncated or edited by hand is rejected. The hash protects against damage,
 //! not against deliberate forgery.
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
@@ -30,7 +30,7 @@ pub fn serialise<T: Serialize>(value: &T) -> Option<String> {
     Some(format!("{}{text}", checksum(&text)))
 }
 
-/// Restores the value from a text written by [`serialise`].
+/// Restores the value from a string written by [`serialise`].
 ///
 /// # Errors
 /// A message if the text was truncated or changed, or comes from another version.

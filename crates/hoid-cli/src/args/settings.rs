@@ -48,7 +48,7 @@ impl Registry for BatchEstimators {
     }
 }
 
-/// Options as typed: names and texts, in the order of the registry.
+/// Options as typed: names and strings, in the order of the registry.
 #[derive(Debug, Clone, Default)]
 pub struct SettingArgs<R = RecursiveMethods> {
     given: Vec<(&'static str, String)>,

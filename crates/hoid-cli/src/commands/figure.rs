@@ -22,7 +22,7 @@ fn format_of(path: &Path) -> Result<FigureFormat, CliError> {
     if !format.is_built() {
         return Err(refused(
             "this build of hoid cannot write PDF or PNG; choose a file name that ends in .svg, or build hoid with \
-             both: cargo build --release -p hoid-cli --features pdf-png",
+             PDF and PNG support: cargo build --release -p hoid-cli --features pdf-png",
         ));
     }
     Ok(format)

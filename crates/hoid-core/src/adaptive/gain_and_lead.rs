@@ -1,4 +1,4 @@
-//! Test of gain and lead: whether they differ between past and present if everything else is as in the past.
+//! Tests whether the gain and lead differ between past and present if everything else is as in the past.
 //!
 //! People who adapt to another controlled element change mainly their gain and lead (D. T. McRuer and H. R. Jex, *IEEE
 //! Trans. Human Factors in Electronics* 8 (1967) 231-249). A test of these two has more power than the test of all

@@ -1,4 +1,4 @@
-//! Ring buffer of the last samples of the record, in the memory of the caller.
+//! Ring buffer of the most recent samples of the record, in the memory of the caller.
 //!
 //! The memory is divided into rings of equal length: the values of each input, the outputs, and the use of each sample.
 
@@ -128,7 +128,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>, const I: usize> History<E, I> {
         sample.checked_sub(age as u64).map_or(0.0, |at| self.get(input, at))
     }
 
-    /// Output and use of a sample.
+    /// Returns the output of a sample, and how the filter used it ([`SampleUse`]).
     #[inline(always)]
     pub fn output(&self, sample: u64) -> (f64, SampleUse) {
         (

@@ -23,7 +23,7 @@ pub(super) fn from_pairs(pairs: &SignalPairs) -> [f64; SIGNAL_COUNT] {
     core::array::from_fn(|i| pairs[i / 2].0[i % 2])
 }
 
-/// Signals of the last samples.
+/// Signals of the most recent samples.
 #[derive(Debug, Clone)]
 pub(super) struct SignalHistory {
     twice: [SignalPairs; 2 * MAX_NOISE_ORDER],
@@ -37,7 +37,7 @@ impl SignalHistory {
         newest: 0,
     };
 
-    /// Returns the signals of the last samples, the newest first.
+    /// Returns the signals of the most recent samples, the newest first.
     #[inline(always)]
     pub fn newest_first(&self) -> &[SignalPairs] {
         self.twice[self.newest..]

@@ -1,5 +1,5 @@
-//! The hold of the operator compared with results in 60 digits, with itself at the borders between its cases, and for
-//! degenerate input.
+//! Compares the zero-order hold of the operator with 60-digit reference values, checks that its branches agree at their
+//! boundaries, and tests degenerate inputs.
 
 use super::*;
 use std::vec::Vec;
@@ -177,8 +177,8 @@ fn fraction_of_one_sample_equals_a_whole_sample() {
 #[test]
 fn jacobian_agrees_with_finite_differences() {
     for case in cases() {
-        // Slower operators change by less than the rounding error of the differences; the results in 60 digits cover
-        // them.
+        // For slower operators the changes are smaller than the rounding errors of the differences; the 60-digit
+        // reference values cover them.
         if case.parameters[2] * case.ts < 0.01 {
             continue;
         }

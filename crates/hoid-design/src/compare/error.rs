@@ -18,7 +18,10 @@ pub enum CompareError {
         expected: usize,
     },
     /// A value or a standard error is not finite.
-    #[error("an estimate is not finite, or a standard error is negative or not finite: leave this person out")]
+    #[error(
+        "an estimate, standard error or covariate is not finite, or a standard error is negative: leave out the \
+         person with this value"
+    )]
     NotFinite,
     /// Columns are linearly dependent.
     #[error("the covariates cannot be distinguished (one is constant, or a sum of other covariates): leave one out")]

@@ -43,7 +43,7 @@ pub struct TargetDifference {
 impl FromStr for TargetDifference {
     type Err = DesignError;
 
-    /// Parses a text such as `crossover=.5` (in rad/s) or `tau_e=10%` (of its value).
+    /// Parses a string such as `crossover=.5` (in rad/s) or `tau_e=10%` (of its value).
     fn from_str(text: &str) -> Result<Self, DesignError> {
         let (name, number, relative) = parse_named_number(text, "quantity with the size of its difference")?;
         Ok(Self {

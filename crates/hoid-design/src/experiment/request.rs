@@ -282,8 +282,9 @@ fn low_line_finding(lines: &[DesignedLine], is_seen: bool) -> Option<Finding> {
     let weak = of_error.filter(|l| l.to_remnant < MIN_LINE_TO_REMNANT_RATIO);
     let weak: Vec<String> = weak.map(|l| format!("{:.2}", l.line.omega_rad_s)).collect();
     let message = format!(
-        "in one run the power of the lines at {} rad/s is less than {MIN_LINE_TO_REMNANT_RATIO} times that of the remnant in e, \
-         so the predicted errors there are too small: use fewer lines or longer runs",
+        "in each run the power of the lines at {} rad/s is less than {MIN_LINE_TO_REMNANT_RATIO} times that of the \
+         remnant in e: the estimates there are biased, and the predicted errors do not include the bias; use fewer \
+         lines or longer runs",
         weak.join(", ")
     );
     (!weak.is_empty()).then(|| Finding::note("lines-drown", message))

@@ -135,7 +135,7 @@ impl Search<'_> {
         Ok((shares, last))
     }
 
-    /// Limits the amplitudes of the lines of each forcing function and normalises the sum of the shares to one.
+    /// Limits the amplitudes of the lines of each forcing function, and scales the shares so that their sum is one.
     fn limit_amplitudes(&self, places: &[CandidateLine], shares: &mut [f64]) {
         for enters in [EntryPoint::Target, EntryPoint::Disturbance] {
             let mut lines: Vec<(f64, bool, &mut f64)> = (places.iter().zip(shares.iter_mut()))

@@ -65,7 +65,7 @@ impl fmt::Display for SpreadSource {
     }
 }
 
-/// A standard deviation with a text that names its source.
+/// A standard deviation with a description of its source.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Spread {
     pub value: f64,

@@ -1,4 +1,4 @@
-//! Test of whether the error e responds to the output u, as in a closed loop.
+//! Tests whether the error e responds to the output u, as in a closed loop.
 //!
 //! In a closed loop every change in u affects e. The test asks whether the last [`TESTED_OUTPUTS_S`] of u improve the
 //! prediction of e from earlier errors and outputs (C. W. J. Granger, *Econometrica* 37 (1969) 424-438). A component

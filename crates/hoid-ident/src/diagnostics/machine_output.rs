@@ -1,4 +1,4 @@
-//! Test of whether the output of a record is the output of the machine instead of the control.
+//! Tests whether the output of a record is the output of the machine instead of the control.
 //!
 //! The error of a tracking task is `e = r - y`. If u is the output y of the machine by mistake, `u = r - e` at every
 //! sample, up to units and signs: a regression of u on e and a recorded target r leaves no residual, and r contributes

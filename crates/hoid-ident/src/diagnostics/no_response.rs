@@ -1,4 +1,4 @@
-//! Test of whether u responds to e at all.
+//! Tests whether u responds to e at all.
 //!
 //! A search over forms, delays and orders finds a response in any pair of signals, so its result is only weak evidence
 //! of a response. This test is therefore done before the search, for all forms at once. Each channel is whitened by an

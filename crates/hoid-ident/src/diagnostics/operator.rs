@@ -43,7 +43,7 @@ pub fn gain_findings(operators: &[(&str, OperatorEstimate)]) -> Vec<Finding> {
     if all_open {
         return vec![Finding::undetermined(
             "gain",
-            "no gain differs from zero by two standard errors: u responds too little to e",
+            "no gain differs from zero by at least two standard errors: u responds too little to e",
         )];
     }
     let backwards = operators.iter().filter(|(_, o)| has_negative_lead(o));
@@ -64,9 +64,9 @@ fn negative_lead_finding(negative: &[String]) -> Option<Finding> {
         Finding::warning(
             "negative-lead",
             format!(
-                "{} {verb} below zero by two standard errors of K_e and of K_e_dot: a gain and a lead do not describe \
-                 this person, whose response may contain a lag; only the response is valid; use --structure operator \
-                 to find the form",
+                "{} {verb} below zero by at least two standard errors of K_e and of K_e_dot: a gain and a lead do not \
+                 describe this person, whose response may contain a lag; only the response is valid; use --structure \
+                 operator to find the form",
                 negative.join(", ")
             ),
         )

@@ -1,4 +1,4 @@
-//! Test of whether u responds to a target that was recorded but is not an input of the fit.
+//! Tests whether u responds to a target that was recorded but is not an input of the fit.
 //!
 //! A person who sees the target follows it even without an error: a fit with one input then finds neither the response
 //! to the error nor the loop that the person closes ([`crate::family::SeenChannel`]). Each channel with the name of a

@@ -1,4 +1,4 @@
-//! Test of whether the recorded loop has the controlled element given by the user.
+//! Tests whether the recorded loop has the controlled element given by the user.
 //!
 //! In a loop with the element `P = B/A`, target r and disturbance d, `e = r - P (u + d)`. In terms of the Fourier
 //! coefficients of a record, which need not be periodic,

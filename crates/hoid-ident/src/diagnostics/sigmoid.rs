@@ -139,7 +139,7 @@ fn family_findings(operators: &[(&str, &ChangedOperator)], sample_time: SampleTi
     if !known {
         all.push(Finding::undetermined(
             "gain",
-            "no gain differs from zero by two standard errors: u responds too little to e",
+            "no gain differs from zero by at least two standard errors: u responds too little to e",
         ));
     } else if !open.is_empty() {
         let verb = if open.len() == 1 { "is" } else { "are" };

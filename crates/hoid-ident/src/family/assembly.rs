@@ -1,4 +1,4 @@
-//! Assembly of the result from the searches of all forms that have a weight: operators with their errors, averaged over
+//! Assembly of the result from the fits of all forms that have a weight: operators with their errors, averaged over
 //! forms, the comparison of methods for the best form, and the verdict.
 //!
 //! The order matters: the methods are first compared with their own errors, and only then is the difference between
@@ -54,14 +54,14 @@ pub(super) struct LineResults<'d> {
     pub missing_reason: Option<String>,
 }
 
-/// The search of a form other than the best one, with its weight in the averages.
+/// The fit of a form other than the best one, with its weight in the averages.
 pub(super) struct OtherForm<'a> {
     pub fit: PredictionFit<'a>,
     pub lines: Option<LineFit>,
     pub weight: f64,
 }
 
-/// The search of the best form, and everything else that the result requires.
+/// The fit of the best form, and everything else that the result requires.
 pub(super) struct ChosenForm<'p, 'a> {
     pub fit: PredictionFit<'a>,
     pub weight: f64,

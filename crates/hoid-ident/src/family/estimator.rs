@@ -28,7 +28,7 @@ use super::{
 use crate::{
     IdentError, InitialState,
     criterion::{Data, Workspace},
-    frequency::{DescribingFunction, DescriptionOptions, describe_runs},
+    frequency::{DescribingFunction, RecordDescriptionOptions, describe_runs},
     informative_data, progress,
 };
 
@@ -38,7 +38,7 @@ const MAX_NOISE_PAIRS: usize = 60;
 /// Reason why the lines are not used if there is little noise.
 const LOW_NOISE_REASON: &str = "the noise is weaker than the leakage";
 
-/// Prepared searches of all forms.
+/// Prepared searches for all forms.
 struct PreparedSearches<'a> {
     prediction: PredictionProblem<'a>,
     starts: Vec<Start>,
@@ -60,10 +60,10 @@ impl FamilyEstimator {
     /// errors but part of the result ([`FamilyFit::verdict`]).
     pub fn fit(&self, records: &[Record]) -> Result<FamilyFit, IdentError> {
         let described = self.excitation.as_ref().map(|channel| {
-            let options = DescriptionOptions {
+            let options = RecordDescriptionOptions {
                 excitation: Some(channel.clone()),
                 period_s: self.period_s,
-                ..DescriptionOptions::default()
+                ..RecordDescriptionOptions::default()
             };
             describe_runs(records, &options).map(|found| found.function)
         });
@@ -202,8 +202,8 @@ impl FamilyEstimator {
         }
     }
 
-    /// Prepares the searches of all forms: determines the starts, the orders of the noise model, and the further inputs
-    /// with a response.
+    /// Prepares the searches for all forms: determines the starts, the orders of the noise model, and the further
+    /// inputs with a response.
     fn prepare_searches<'a>(
         &self,
         records: &'a [Record],

@@ -29,9 +29,9 @@ const MAX_START_RESIDUAL_SHARE: f64 = 0.05;
 const LOW_NOISE_SHARE: f64 = 5e-3;
 /// Relative residual power below which the residual is rounding error and the search ends.
 const ROUNDING_SHARE: f64 = 1e-25;
-/// Number of grid points for further searches of a form whose residual is not yet small, and number of rounds of these
-/// searches. The second round uses the best form of the first round.
+/// Number of grid points from which a form whose residual is not yet small is fitted again.
 const ADDITIONAL_START_COUNT: usize = 4;
+/// Number of rounds of these fits. The second round uses the best form of the first round.
 const ROUND_COUNT: usize = 2;
 /// Ratio of the residual powers for two intersample behaviours below which the difference is decisive. For a continuous
 /// error neither model is right: the hold has the relative error `x^2/6` and linear interpolation `x^2/3` with
@@ -54,7 +54,7 @@ pub(super) struct SearchResult {
     share: f64,
 }
 
-/// Results of the output error searches of all forms, if there is little noise.
+/// Results of the output error fits of all forms, if there is little noise.
 #[derive(Debug, Clone)]
 pub(super) struct LowNoiseFits {
     /// Result of each form; `None` if its searches failed.

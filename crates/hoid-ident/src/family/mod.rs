@@ -23,13 +23,13 @@
 //! | file | contents |
 //! |---|---|
 //! | `options` | [`FamilyEstimator`]: options as fields and by name |
-//! | `estimator` | the searches of all forms |
-//! | `starts` | the starts of these searches, and the orders of the noise model |
+//! | `estimator` | the fits of all forms |
+//! | `starts` | the starts of the searches, and the orders of the noise model |
 //! | `channel` | a further input: request, form, results |
 //! | `channels` | inputs of a person in addition to the error; `choice`: selection of their forms |
 //! | `channel_lines`, `channel_criterion` | means and variances of several inputs at the lines; the fit to them |
 //! | `comparison` | comparison of the forms |
-//! | `assembly` | assembly of the result from the searches of the forms |
+//! | `assembly` | assembly of the result from the fits of the forms |
 //! | `estimated` | the operator of a record with its errors |
 //! | `result` | [`FamilyFit`] |
 //! | `parameter` | a parameter with its interval, its prior share, and whether the data determine it |

@@ -126,9 +126,11 @@ impl FamilyEstimator {
                 expected,
             };
             if !matches!(name.as_str(), "nc" | "nd") {
-                return Err(refuse(
-                    "only the orders nc and nd of the noise model: the form determines the other orders".to_owned(),
-                ));
+                return Err(IdentError::BadOption {
+                    option: "orders of the noise model".to_owned(),
+                    found: name.clone(),
+                    expected: "nc or nd: the form determines the other orders".to_owned(),
+                });
             }
             if *range.end() > HIGHEST_NOISE_ORDER {
                 return Err(refuse(format!("a number or a range within 0..{HIGHEST_NOISE_ORDER}")));

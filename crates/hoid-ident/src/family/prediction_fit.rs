@@ -1,4 +1,4 @@
-//! Result of the prediction error search of one form.
+//! Result of the prediction error fit of one form.
 
 use super::{clusters::Clusters, layout::FamilyLayout};
 use crate::{

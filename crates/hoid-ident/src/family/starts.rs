@@ -28,8 +28,8 @@ use super::{
 };
 use crate::{IdentError, criterion::Workspace};
 
-/// Number of minima for the response from which the prediction error search of a form runs; twice as many without a
-/// prior.
+/// Number of minima for the response from which prediction error searches for a form are started; twice as many
+/// without a prior.
 const SEARCH_COUNT: usize = 2;
 /// Relative difference of the responses of two minima below which only one of them is a start.
 const SAME_RESPONSE_TOLERANCE: f64 = 0.1;

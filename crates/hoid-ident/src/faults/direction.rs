@@ -1,4 +1,4 @@
-//! Test of which of two channels responds to the other, and with which sign.
+//! Tests which of two channels responds to the other, and with which sign.
 //!
 //! Both channels are averaged over blocks of [`BLOCK_S`]. Each channel is regressed on its own past and on the past of
 //! the other channel,

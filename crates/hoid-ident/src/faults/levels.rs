@@ -9,9 +9,9 @@
 //! [`MAX_BRIDGED_S`](super::limits::MAX_BRIDGED_S) apart are a spike; for a known modulus they are a turn and its
 //! reversal, and unwrapping repairs the channel in either case.
 //!
-//! **Step.** At a large change, the medians of [`SPAN_S`] before and after differ by more than [`MIN_STEP`] times the
-//! larger deviation within the two spans, and by more than four fifths of the change: the person has not compensated
-//! for the change, as they would for a step of the target.
+//! **Step.** The medians of the spans of [`SPAN_S`] before and after a large change differ by more than [`MIN_STEP`]
+//! times the larger robust deviation within the two spans, and by more than four fifths of the change: the person has
+//! not compensated for the change, as they would for a step in the target.
 //!
 //! **Scale.** In one second the deviation from the level exceeds the median of this deviation over all seconds by the
 //! factor [`UNIT_FACTOR`]. For a stick with a [rest](super::stick_rest) only the samples away from the rest count. No
@@ -26,7 +26,7 @@ use super::{
 };
 
 const LARGE_CHANGE: f64 = 6.0;
-/// Length of the spans before and after a step, s.
+/// Length of the spans before and after a step (in s).
 const SPAN_S: f64 = 5.0;
 /// Minimum size of a step, relative to the larger deviation in the two spans.
 const MIN_STEP: f64 = 6.0;
@@ -99,7 +99,8 @@ pub(super) fn find_wrap(values: &[f64], sample_time_s: f64) -> Option<Wrap> {
     })
 }
 
-/// Returns the steps of the level: for each step its first sample, its size, and its size in deviations.
+/// Returns the steps in the level: for each, its first sample, its size, and the magnitude of its size in units of the
+/// larger robust deviation of the two adjacent spans.
 pub(super) fn steps(values: &[f64], sample_time_s: f64) -> Vec<(usize, f64, f64)> {
     let span = (SPAN_S / sample_time_s) as usize;
     let typical = typical_change(values);

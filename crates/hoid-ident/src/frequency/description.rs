@@ -35,7 +35,7 @@ const LONGEST_DELAY_S: f64 = 0.6;
 
 /// Options of a description. By default all choices are made from the records.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct DescriptionOptions {
+pub struct RecordDescriptionOptions {
     /// Name of the channel with the recorded disturbance or target.
     pub excitation: Option<String>,
     /// Lines of the excitation, rad/s.
@@ -89,7 +89,7 @@ impl Description {
 ///
 /// # Errors
 /// [`IdentError::BadOption`] if no excitation is found, and the errors of [`describe()`] and [`Excitation::detect`].
-pub fn describe_runs(records: &[Record], options: &DescriptionOptions) -> Result<Description, IdentError> {
+pub fn describe_runs(records: &[Record], options: &RecordDescriptionOptions) -> Result<Description, IdentError> {
     let (from_s, to_s) = (options.from_s, options.to_s);
     let cut = |r: &Record| match (from_s, to_s) {
         (None, None) => Ok(r.clone()),
@@ -173,7 +173,10 @@ fn fitted_delay_s(function: &DescribingFunction) -> f64 {
 }
 
 /// Returns the excitation and the name of its channel, which is `None` if only the lines are known.
-fn excitation_of(record: &Record, options: &DescriptionOptions) -> Result<(Excitation, Option<String>), IdentError> {
+fn excitation_of(
+    record: &Record,
+    options: &RecordDescriptionOptions,
+) -> Result<(Excitation, Option<String>), IdentError> {
     let search = LineDetectionOptions {
         period_s: options.period_s,
         ..LineDetectionOptions::default()

@@ -70,9 +70,9 @@ fn record(samples: usize, e: impl Fn(usize) -> f64, u: impl Fn(usize) -> f64) ->
 #[test]
 fn default_options_describe_several_runs() {
     let (records, element) = (runs(5), element());
-    let options = DescriptionOptions {
+    let options = RecordDescriptionOptions {
         controlled_element: Some(element.clone()),
-        ..DescriptionOptions::default()
+        ..RecordDescriptionOptions::default()
     };
     let found = describe_runs(&records, &options).unwrap();
     assert_eq!(
@@ -114,7 +114,7 @@ fn default_options_describe_several_runs() {
 #[test]
 fn single_run_is_doubtful() {
     let records = runs(1);
-    let found = describe_runs(&records, &DescriptionOptions::default()).unwrap();
+    let found = describe_runs(&records, &RecordDescriptionOptions::default()).unwrap();
     assert_eq!((found.realisation, found.function.runs.len()), (Realisation::Record, 1));
     assert_eq!(
         (found.verdict.level, finding_kinds(&found)),
@@ -124,7 +124,7 @@ fn single_run_is_doubtful() {
     // The record contains four periods of one run, with little noise.
     let rough = noise(3, 4 * PERIOD_SAMPLES);
     let one = record(4 * PERIOD_SAMPLES, excitation, |k| 2.0 * excitation(k) + 0.1 * rough[k]);
-    let found = describe_runs(std::slice::from_ref(&one), &DescriptionOptions::default()).unwrap();
+    let found = describe_runs(std::slice::from_ref(&one), &RecordDescriptionOptions::default()).unwrap();
     assert_eq!((found.realisation, found.function.runs.len()), (Realisation::Period, 4));
     assert_eq!(
         (found.verdict.level, finding_kinds(&found)),
@@ -132,10 +132,10 @@ fn single_run_is_doubtful() {
     );
     // The zero target r is skipped in the search for the excitation.
     assert_eq!(found.channel.as_deref(), Some("d"));
-    let span = DescriptionOptions {
+    let span = RecordDescriptionOptions {
         from_s: Some(20.0),
         to_s: Some(60.0),
-        ..DescriptionOptions::default()
+        ..RecordDescriptionOptions::default()
     };
     let found = describe_runs(&[one], &span).unwrap();
     assert_eq!(
@@ -146,7 +146,7 @@ fn single_run_is_doubtful() {
 
 #[test]
 fn unrelated_runs_are_not_determined() {
-    let options = DescriptionOptions::default();
+    let options = RecordDescriptionOptions::default();
     // By chance, one in 20 sets of unrelated runs is not reported as unrelated; for 400 sets the standard error of this
     // share is 0.011.
     let mut followed = 0;
@@ -185,9 +185,9 @@ fn crossover_outside_the_measured_lines_is_doubtful() {
         .map(|n| record(PERIOD_SAMPLES, excitation, |k| 2.0 * excitation(k) + 0.1 * n[k]))
         .collect();
     let with = |text: &str| {
-        let options = DescriptionOptions {
+        let options = RecordDescriptionOptions {
             controlled_element: Some(text.parse().unwrap()),
-            ..DescriptionOptions::default()
+            ..RecordDescriptionOptions::default()
         };
         describe_runs(&runs, &options).unwrap()
     };
@@ -219,9 +219,9 @@ fn faults_of_the_excitation_are_reported() {
             .map(|k| excitation(k) + 0.05 * rough[k])
             .collect(),
     );
-    let noisy = DescriptionOptions {
+    let noisy = RecordDescriptionOptions {
         excitation: Some("w".to_owned()),
-        ..DescriptionOptions::default()
+        ..RecordDescriptionOptions::default()
     };
     let found = describe_runs(&[of(4 * PERIOD_SAMPLES).with_channel(measured).unwrap()], &noisy).unwrap();
     assert_eq!(found.verdict.level, VerdictLevel::Trustworthy, "{}", found.verdict);
@@ -231,25 +231,25 @@ fn faults_of_the_excitation_are_reported() {
         found.verdict
     );
     // The excitation has a line that is not among the given lines.
-    let missing = DescriptionOptions {
+    let missing = RecordDescriptionOptions {
         excitation: Some("d".to_owned()),
         lines_rad_s: Some([2.0, 5.0, 9.0].map(|h| h * TAU / 20.0).to_vec()),
         period_s: Some(20.0),
-        ..DescriptionOptions::default()
+        ..RecordDescriptionOptions::default()
     };
     let found = describe_runs(&[of(4 * PERIOD_SAMPLES)], &missing).unwrap();
     assert_eq!(finding_kinds(&found), ["leakage", "periods-as-runs"]);
     assert_eq!(found.verdict.level, VerdictLevel::Doubtful);
     // Without the channel of the excitation the average has no reference.
-    let alone = DescriptionOptions {
+    let alone = RecordDescriptionOptions {
         excitation: None,
         ..missing.clone()
     };
     let found = describe_runs(&[of(4 * PERIOD_SAMPLES)], &alone).unwrap();
     assert!(found.channel.is_none() && finding_kinds(&found).contains(&"no-reference"));
-    let late = DescriptionOptions {
+    let late = RecordDescriptionOptions {
         offset_samples: 1.002,
-        ..DescriptionOptions::default()
+        ..RecordDescriptionOptions::default()
     };
     let found = describe_runs(&[of(4 * PERIOD_SAMPLES)], &late).unwrap();
     assert!(finding_kinds(&found).contains(&"offset-not-whole"));
@@ -257,10 +257,11 @@ fn faults_of_the_excitation_are_reported() {
 
 #[test]
 fn invalid_requests_are_refused() {
-    let options = DescriptionOptions::default();
+    let options = RecordDescriptionOptions::default();
     assert!(matches!(describe_runs(&[], &options), Err(IdentError::NoRecords)));
-    let message =
-        |records: &[Record], options: &DescriptionOptions| describe_runs(records, options).unwrap_err().to_string();
+    let message = |records: &[Record], options: &RecordDescriptionOptions| {
+        describe_runs(records, options).unwrap_err().to_string()
+    };
     let ts = SampleTime::new(0.1).unwrap();
     let wave: Vec<f64> = (0..PERIOD_SAMPLES).map(excitation).collect();
     let bare = Record::new(ts, Channel::new("e", "", wave.clone()), Channel::new("u", "", wave)).unwrap();
@@ -269,24 +270,24 @@ fn invalid_requests_are_refused() {
         text.contains("none among e, u") && text.contains("lines in rad/s"),
         "{text}"
     );
-    let lines = DescriptionOptions {
+    let lines = RecordDescriptionOptions {
         lines_rad_s: Some(vec![1.0]),
-        ..DescriptionOptions::default()
+        ..RecordDescriptionOptions::default()
     };
     assert!(message(std::slice::from_ref(&bare), &lines).contains("period in s"));
-    let named = DescriptionOptions {
+    let named = RecordDescriptionOptions {
         excitation: Some("w".to_owned()),
-        ..DescriptionOptions::default()
+        ..RecordDescriptionOptions::default()
     };
     assert!(message(&[bare], &named).contains("one of e, u"));
     // The span is not a whole number of periods; this is reported for the channel that exists.
     let half = record(PERIOD_SAMPLES * 5 / 4, excitation, excitation);
     assert!(message(&[half], &options).contains("whole periods"));
     let twice = record(PERIOD_SAMPLES, excitation, |k| 2.0 * excitation(k));
-    let nonsense = DescriptionOptions {
+    let nonsense = RecordDescriptionOptions {
         from_s: Some(5.0),
         to_s: Some(1.0),
-        ..DescriptionOptions::default()
+        ..RecordDescriptionOptions::default()
     };
     assert!(describe_runs(&[twice], &nonsense).is_err());
 }

@@ -108,8 +108,8 @@ fn starts_from_poles(
     starts
 }
 
-/// Returns starts from candidates for F with their own A, B and noise model. A, B and the noise model are computed here
-/// if the model has A or C; otherwise they are still unknown in the starts.
+/// Returns one start for each candidate for F. If the model has A or C, or if the initial state is backcast, A, B and
+/// the noise model of each start are computed here; otherwise they are still unknown.
 fn completed_starts(
     criterion: &Criterion<'_>,
     proposals: Vec<(String, Vec<f64>)>,

@@ -1,4 +1,4 @@
-//! Test of whether a start leads to a known minimum.
+//! Tests whether a start leads to a known minimum.
 
 use super::objective::Minimum;
 use crate::linalg::vectors::dot;

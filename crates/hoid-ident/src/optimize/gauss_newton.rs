@@ -39,7 +39,7 @@ pub(crate) struct GaussNewton<'s> {
 
 /// Purpose of the next linearisation.
 enum Trial {
-    /// Test of whether the start is usable.
+    /// Tests whether the start is usable.
     Start,
     /// A Levenberg-Marquardt step, with the decrease that the quadratic model predicts.
     Damped { predicted: f64 },

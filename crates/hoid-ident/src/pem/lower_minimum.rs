@@ -5,9 +5,9 @@
 //! each start show which starts decrease the loss. The best searches are completed, unless they come close to the known
 //! minimum and are not predicted to end lower. If nothing lower is found, the known result remains bitwise unchanged.
 //!
-//! **Conditions.** Records of some hundred samples have many minima. A model with more coefficients than the operator
-//! (nb, nf > 2, nc > 0, nd > 4) has many minima for longer records too; in this case the first few steps use only a
-//! part of the record, so their cost does not depend on its length.
+//! **Conditions.** With records of a few hundred samples, the loss has many local minima. With more coefficients than
+//! the operator has (nb, nf > 2, nc > 0, nd > 4), it has many minima for longer records too; in this case the first few
+//! steps use only a part of the record, so their cost does not depend on its length.
 
 use super::{constraints::ConstrainedCriterion, fit_settings::FitSettings};
 use crate::{

@@ -10,7 +10,7 @@ type ValueSetter<E, X> = Box<dyn Fn(&mut E, &Setting, &str) -> Result<(), X>>;
 /// Function that returns the value of an option as text for a given sample time; `None` if the value is not printed.
 type ValueFormatter<E> = Box<dyn Fn(&E, SampleTime) -> Option<String>>;
 
-/// An option of an estimator `E`; invalid texts give errors of type `X`.
+/// An option of an estimator `E`; invalid text gives an error of type `X`.
 pub struct BatchOption<E, X = IdentError> {
     /// Name, type, default, bounds and help text.
     pub setting: Setting,
@@ -47,7 +47,7 @@ impl<E: 'static, X: 'static> BatchOption<E, X> {
         }
     }
 
-    /// Sets the option from a text.
+    /// Sets the option from text.
     ///
     /// # Errors
     /// An error of type `X` if the text is not a valid value or contradicts an option that was set before.

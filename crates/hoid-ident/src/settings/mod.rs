@@ -49,7 +49,7 @@ pub trait Settings {
     /// Returns the available settings in the order of their declaration, with their defaults.
     fn list(&self) -> Vec<Setting>;
 
-    /// Sets an option from a text; returns false if there is no option with this name.
+    /// Sets an option from text; returns false if there is no option with this name.
     ///
     /// # Errors
     /// [`IdentError::BadOption`] if the text is not a valid value of the option or is outside its bounds.

@@ -12,7 +12,7 @@ pub trait Value: Sized {
     /// Type as shown to users.
     const KIND: Kind;
 
-    /// Parses a text.
+    /// Parses the text of a value.
     ///
     /// # Errors
     /// A description of the expected value.

@@ -28,10 +28,10 @@ pub struct ResidualDiagnostics {
 /// Share of lags outside the 99 % bound above which a correlation is significant.
 pub const MAX_OUTSIDE_SHARE: f64 = 0.06;
 
-/// Simulated and predicted output of a model for a record, with the measures and tests derived from them.
+/// Simulated and predicted outputs of a model for a record, with the measures and tests derived from them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Validation {
-    /// First sample of the simulated and the predicted output.
+    /// Index in the record of the first sample of the simulated and predicted outputs.
     pub first: usize,
     /// Simulated output.
     pub simulated: Vec<f64>,

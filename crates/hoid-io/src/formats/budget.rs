@@ -17,7 +17,7 @@ const BUDGET_BYTES_PER_FILE_BYTE: u64 = 64;
 const MAX_BUDGET_BYTES: u64 = 16 << 30;
 /// Environment variable that raises the limit, in MB.
 const LIMIT_VARIABLE: &str = "HOID_MAX_UNPACKED_MB";
-/// Memory that a text takes in addition to its characters, in bytes.
+/// Memory that a string takes in addition to its characters, in bytes.
 const TEXT_OVERHEAD_BYTES: u64 = 64;
 /// Maximum nesting of structures.
 pub(super) const MAX_NESTING: usize = 32;
@@ -65,7 +65,7 @@ impl Budget {
         self.take(more.saturating_mul(count as u64), file)
     }
 
-    /// Reserves the memory of `count` texts with `bytes` bytes in total.
+    /// Reserves the memory of `count` strings with `bytes` bytes in total.
     pub(super) fn take_texts(&mut self, count: usize, bytes: usize, file: &str) -> Result<(), IoError> {
         self.take(
             TEXT_OVERHEAD_BYTES
@@ -121,7 +121,7 @@ mod tests {
         assert!(budget.take(1 << 27, "a.mat").is_err());
         budget.take(1 << 25, "a.mat").unwrap();
         assert!(budget.take(1 << 25, "a.mat").is_err());
-        // A million texts of one character exceed the limit of a small file.
+        // A million strings of one character exceed the limit of a small file.
         assert!(Budget::of(1000).take_texts(1_000_000, 1_000_000, "a.mat").is_err());
         // A larger file may decompress to more.
         Budget::of(10 << 20).take(1 << 29, "a.mat").unwrap();

@@ -91,7 +91,7 @@ fn report_cut(table: &mut Table<'_>, bounds: &Range<usize>) {
     let (before, after) = (bounds.start, table.rows.saturating_sub(bounds.end));
     if (before, after) != (0, 0) {
         table.notes.push(format!(
-            "{} at the start and {after} at the end cut: a sparse column has no values there",
+            "{} at the start and {after} at the end were cut: a sparse column has no values there",
             count_with_noun(before, "row")
         ));
     }

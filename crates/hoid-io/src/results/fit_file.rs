@@ -63,7 +63,7 @@ pub fn read_fit(path: &Path) -> Result<FitFile, IoError> {
 /// Reads a fit from the text of its file.
 ///
 /// # Errors
-/// [`IoError::NoFit`] for a text that is not such a fit.
+/// [`IoError::NoFit`] for text that is not such a fit.
 pub fn parse_fit(text: &str, source: &str) -> Result<FitFile, IoError> {
     let found: FitObject = serde_json::from_str(text).map_err(|error| no_fit_error(source, error.to_string()))?;
     let of = |p: &ParameterObject| {

@@ -71,7 +71,7 @@ fn short_number(value: f64) -> String {
     }
 }
 
-/// Returns the line, counted from 1, of a byte offset in a text.
+/// Returns the line, counted from 1, of a byte offset in the text.
 pub(super) fn line_of(text: &str, offset: usize) -> usize {
     let before = text.bytes().take(offset);
     before.filter(|b| *b == b'\n').count().saturating_add(1)

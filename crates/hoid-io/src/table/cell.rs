@@ -135,7 +135,7 @@ fn is_fortran(text: &str) -> bool {
 }
 
 /// True if a cell looks like a date or a clock time, such as `2024-03-01 10:00:00.5` or `10:00:00,5`.
-pub(super) fn is_moment(cell: &str) -> bool {
+pub(super) fn looks_like_date_or_time(cell: &str) -> bool {
     let parts = |marks: &[char]| {
         cell.split(marks)
             .filter(|part| part.starts_with(|c: char| c.is_ascii_digit()))
@@ -239,10 +239,10 @@ mod tests {
             "01.03.2024",
             "3/1/2024",
         ] {
-            assert!(is_moment(moment), "{moment}");
+            assert!(looks_like_date_or_time(moment), "{moment}");
         }
         for other in ["abc", "s", "1.5.", "-1", "1-2", "a:b:c", ""] {
-            assert!(!is_moment(other), "{other}");
+            assert!(!looks_like_date_or_time(other), "{other}");
         }
     }
 }

@@ -59,7 +59,7 @@ impl ColumnExpression {
         terms
     }
 
-    /// Returns the texts before and after each hyphen in the text.
+    /// Returns the parts before and after each hyphen in the text.
     fn splits(&self) -> impl Iterator<Item = (&str, &str)> {
         let hyphens = self.text.match_indices('-');
         hyphens.filter_map(|(at, hyphen)| {

@@ -8,7 +8,7 @@ use std::borrow::Cow;
 use std::collections::HashMap;
 use std::ops::Range;
 
-use super::cell::{Cell, DECIMAL_COMMA_REMEDY, has_decimal_comma, is_moment};
+use super::cell::{Cell, DECIMAL_COMMA_REMEDY, has_decimal_comma, looks_like_date_or_time};
 use super::precision::Precision;
 use crate::IoError;
 use crate::wording::{abbreviate, format_name};
@@ -31,7 +31,7 @@ pub(crate) struct Column {
     /// Rows that contain text, in increasing order.
     pub(crate) texts: Vec<usize>,
     /// True if the values are clock times, converted to s from the first one.
-    pub(crate) moments: bool,
+    pub(crate) is_clock_time: bool,
     /// Rows whose value was not recorded but computed from other values of the column (`--sparse`), in increasing
     /// order.
     pub(crate) filled_rows: Vec<usize>,
@@ -131,11 +131,14 @@ impl Table<'_> {
             } else if matches!(Cell::parse(&found), Cell::Number(_)) {
                 "the point may separate thousands, as the column jumps between such numbers and whole numbers: write \
                  the numbers without thousands separators, or all of them with decimals"
-            } else if column.texts.len() == self.rows && !column.moments && (column.name == "t" || is_moment(&found)) {
+            } else if column.texts.len() == self.rows
+                && !column.is_clock_time
+                && (column.name == "t" || looks_like_date_or_time(&found))
+            {
                 UNREAD_MOMENT_REMEDY
-            } else if is_moment(&found) && column.texts.len() == self.rows {
+            } else if looks_like_date_or_time(&found) && column.texts.len() == self.rows {
                 "the column holds dates or clock times: choose it with --time, or choose another column"
-            } else if is_moment(&found) {
+            } else if looks_like_date_or_time(&found) {
                 "the column mixes numbers with dates or clock times: write it in one format, or give --fs HZ if the \
                  samples are evenly spaced"
             } else if row == 0 && self.rows > 1 && self.row_has_no_numbers(row) {
@@ -213,7 +216,7 @@ pub(crate) fn check_names(names: &[String], file: &str, notes: &mut Vec<String>)
     Ok(())
 }
 
-/// Maximum number of columns of a table; recordings typically have some tens of columns.
+/// Maximum number of columns of a table; recordings typically have a few tens of columns.
 const MAX_COLUMNS: usize = 10_000;
 
 /// Checks the number of columns before memory is allocated for them.

@@ -158,7 +158,7 @@ pub(crate) fn is_clock_time(cell: &str) -> bool {
     parse(cell).is_some()
 }
 
-/// Interpretation of the texts of a column, row by row: they are clock times unless some cell has other contents.
+/// Interpretation of the text cells of a column, row by row: they are clock times unless some cell has other contents.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) enum ClockTimes {
     /// All values so far are missing.
@@ -167,7 +167,7 @@ pub(crate) enum ClockTimes {
     /// Clock times in ns: the first one, from which the others are counted, the last one, and the time added to it
     /// because the clock returned to zero.
     From { first: i64, last: i64, added: i64 },
-    /// The column contains numbers or other texts.
+    /// The column contains numbers or other text.
     No,
 }
 
@@ -200,7 +200,7 @@ impl ClockTimes {
             last: now,
             added,
         };
-        column.moments = true;
+        column.is_clock_time = true;
         column.precision.join(precision);
         column.values.push(seconds_between(now, first));
     }
@@ -208,7 +208,7 @@ impl ClockTimes {
     /// Called if a number was found in the column: its apparent clock times are then treated as text.
     pub(crate) fn refuse(&mut self, column: &mut Column) {
         if let Self::From { .. } = std::mem::replace(self, Self::No) {
-            column.moments = false;
+            column.is_clock_time = false;
             column.precision = Precision::default();
             let of_text = |(row, value): (usize, &mut f64)| {
                 let text = !value.is_nan();
@@ -300,7 +300,7 @@ const DAY_NAMES: [&str; 7] = [
     "sunday",
 ];
 
-/// True if a text is a name or the first three letters of a name.
+/// True if the text is a name or the first three letters of a name.
 fn is_name(text: &str, name: &str) -> bool {
     text.eq_ignore_ascii_case(name) || name.get(..3).is_some_and(|start| text.eq_ignore_ascii_case(start))
 }

@@ -131,22 +131,28 @@ pub(crate) fn is_time_unit(unit: &str) -> bool {
     Unit::of(unit).is_some()
 }
 
-/// Returns the table, in which the column recognised or selected as the time, if any, is named t and is in s.
+/// Returns the table with its time column, if one is selected or recognised, renamed to t and converted to s.
 pub(crate) fn with_time<'a>(mut table: Table<'a>, choice: Option<&TimeChoice>) -> Result<Table<'a>, IoError> {
     let found = match choice {
         Some(choice) => Some(selected_time_column(&table, choice)?),
-        None if table.columns.iter().any(|column| column.name == "t" && !column.moments) => table
+        None if table
             .columns
             .iter()
-            .position(|column| column.name == "t")
-            .map(|at| (at, None)),
+            .any(|column| column.name == "t" && !column.is_clock_time) =>
+        {
+            table
+                .columns
+                .iter()
+                .position(|column| column.name == "t")
+                .map(|at| (at, None))
+        }
         None => find_time_column(&table),
     };
     if let Some((at, unit)) = found {
         convert_to_time(&mut table, at, unit);
     }
     // Clock times in other columns do not count as numbers.
-    for column in table.columns.iter_mut().filter(|column| column.moments) {
+    for column in table.columns.iter_mut().filter(|column| column.is_clock_time) {
         column.values.fill(f64::NAN);
         column.texts = (0..table.rows).collect();
     }
@@ -196,7 +202,7 @@ fn find_time_column(table: &Table<'_>) -> Option<(usize, Option<Unit>)> {
             matches!(column_role(&column.name), ColumnRole::Time(_)) && column.texts.is_empty()
         })
     };
-    let by_type = || only_match(table, |_, column| column.moments && !is_constant(&column.values));
+    let by_type = || only_match(table, |_, column| column.is_clock_time && !is_constant(&column.values));
     let by_stamp = || {
         only_match(table, |_, column| {
             let values = &column.values;
@@ -328,7 +334,7 @@ fn convert_to_time(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
     let was_t = time.name == "t";
     let stated = unit.or_else(|| Unit::of(&time.unit));
     let unit = match stated {
-        _ if time.moments => Unit::Iso,
+        _ if time.is_clock_time => Unit::Iso,
         Some(unit) => unit,
         None => infer_unit(&time.values, time.precision.has_decimals()),
     };
@@ -336,7 +342,7 @@ fn convert_to_time(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
         return;
     }
     // If the name of the column does not denote a time, its printed digits were not counted.
-    if time.precision == Precision::default() && !time.moments {
+    if time.precision == Precision::default() && !time.is_clock_time {
         time.precision = Precision::from_times(&time.values, false);
     }
     let own = std::mem::replace(&mut time.name, String::from("t"));
@@ -364,7 +370,7 @@ fn convert_to_time(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
     };
     let note = match unit {
         Unit::Iso => {
-            time.moments = false;
+            time.is_clock_time = false;
             let taken = if was_t { "" } else { "taken as t, " };
             format!("{name} is {taken}in s from its first time stamp")
         }

@@ -335,7 +335,7 @@ pub fn mutate_json(value: &mut Value, draw: &mut Draw) {
     }
 }
 
-/// Modifies a byte, the end, a part of a text, or a number in it.
+/// Modifies a byte, the end, a part or a number of the text.
 pub fn mutate_bytes(text: &mut Vec<u8>, draw: &mut Draw) {
     if text.is_empty() {
         return;

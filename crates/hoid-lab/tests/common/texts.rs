@@ -24,17 +24,17 @@ const SCENARIOS: [&str; 3] = [
 
 const MANIFEST: &str = include_str!("../../../../fixtures/group/tracking.toml");
 
-/// Reads a text, which may be stored at a path, as a command does before it computes; true if the text is accepted.
+/// Reads text, which may be stored at a path, as a command does before it computes; true if the text is accepted.
 type Reader = fn(&str, &Path) -> bool;
 
-/// A valid text and its reader.
+/// A valid input and its reader.
 pub struct Text {
     text: String,
     is_json: bool,
     reader: Reader,
 }
 
-/// Returns the valid texts, including a fit of this record.
+/// Returns the valid inputs, including a fit of this record.
 pub fn valid_texts(record: &Record) -> Vec<Text> {
     let toml = |text: &str, reader: Reader| Text {
         text: text.to_owned(),

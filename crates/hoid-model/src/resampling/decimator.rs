@@ -35,15 +35,16 @@ pub struct Decimator<const C: usize> {
 /// Past samples of one channel.
 #[derive(Debug, Clone)]
 struct DecimatedChannel {
-    /// Number of whole samples from old sample `k M` to the instant of the new value: 0, or the middle of the M
-    /// samples.
+    /// Number of old samples, rounded down, from old sample `k M` to the instant of the new value: for a held input
+    /// the instant is the middle of the M samples, otherwise sample `k M` itself.
     lead: i64,
-    /// Position of the first weight relative to the instant of the new value, and the weights.
+    /// Position of the first weight relative to old sample `k M + lead` (in old samples).
     offset: i64,
+    /// Weights of the filter.
     weights: Vec<f64>,
-    /// Past samples that the filter needs. The first of them has the index `first`, which is negative within the
-    /// reflection of the start.
+    /// Past samples that the filter needs.
     past: VecDeque<f64>,
+    /// Index of the first of the past samples; negative within the reflection of the start.
     first: i64,
     /// Last valid value of the channel.
     last: f64,

@@ -273,7 +273,7 @@ fn bar_ends(v: &Estimate) -> (f64, f64) {
 mod tests {
     use std::f64::consts::TAU;
 
-    use hoid_ident::frequency::{DescriptionOptions, describe_runs};
+    use hoid_ident::frequency::{RecordDescriptionOptions, describe_runs};
     use hoid_model::{Channel, Record, SampleTime};
 
     use super::*;
@@ -297,7 +297,7 @@ mod tests {
                 .unwrap()
         };
         let records: Vec<Record> = (0..runs).map(record).collect();
-        describe_runs(&records, &DescriptionOptions::default()).unwrap()
+        describe_runs(&records, &RecordDescriptionOptions::default()).unwrap()
     }
 
     #[test]

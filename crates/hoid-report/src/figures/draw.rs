@@ -140,13 +140,13 @@ pub fn fitted_text(x: f64, y: f64, content: String, room: f64, rotate: Option<f6
     text(x, y, content, size, TextAnchor::Middle, rotate)
 }
 
-/// Space for a text in the reader's font; without Helvetica or Arial this is often DejaVu Sans, which is about an
+/// Space for text in the reader's font; without Helvetica or Arial this is often DejaVu Sans, which is about an
 /// eighth wider.
 pub fn text_space(text: &str, size: u32) -> f64 {
     1.14 * text_width(text, size)
 }
 
-/// Approximate width of a text in Helvetica, on average slightly too large.
+/// Approximate width of text in Helvetica, on average slightly too large.
 pub fn text_width(text: &str, size: u32) -> f64 {
     let of = |sign: char| match sign {
         ' ' | '.' | ',' | ':' | ';' | 'i' | 'j' | 'l' | '|' | '\'' | 'I' => 0.28,

@@ -3,8 +3,8 @@
 //! The drawing library has no subscripts. Subscripts and superscripts are marked by characters of the private use area
 //! of Unicode, which become tags in the finished SVG ([`insert_tags`]). SVG readers differ: some add the shifts of
 //! nested tags, others replace them. Some drop tags without text, trim spaces at the edges of a tag, or position each
-//! tag of a centred text separately. The tags are therefore not nested; each contains text and the full shift from the
-//! previous tag, and leading spaces are non-breaking. `svg` sets the start position of a text with tags.
+//! tag of centred text separately. The tags are therefore not nested; each contains text and the full shift from the
+//! previous tag, and leading spaces are non-breaking. `svg` sets the start position of text with tags.
 
 /// Markers in a label for the start and end of a subscript and of a superscript; they become tags.
 const SUB: char = '\u{e000}';
@@ -42,7 +42,7 @@ impl Level {
 const SUBSCRIPT_SIZE: &str = "12.2";
 const SUBSCRIPT_SIZE_RATIO: f64 = 12.2 / 13.0;
 
-/// Escapes dollar signs in a text, because a dollar sign would start a formula.
+/// Escapes dollar signs in text, because a dollar sign would start a formula.
 fn escape_dollars(text: &str) -> String {
     text.replace('$', "\\$")
 }

@@ -58,8 +58,7 @@ fn escape_xml(text: &str) -> String {
         .replace('"', "&quot;")
 }
 
-/// Anchors texts with tags at their start, because SVG readers do not agree on the position of the tags in a centred
-/// text.
+/// Anchors text with tags at its start, because SVG readers do not agree on the position of the tags in centred text.
 fn anchor_tagged_texts(mut scene: Scene) -> Scene {
     for element in &mut scene.elements {
         let Primitive::Text {

@@ -28,7 +28,7 @@ pub struct Task {
     /// Duration of the run-in in s. Default: 5 s.
     pub run_in_s: f64,
     /// Spread of the parameters between runs, such as 0.03 for 3 %. Default: 0.
-    pub between_runs: f64,
+    pub spread_between_runs: f64,
     /// Display of the task. Unless only the error is displayed, a target with lines between those of the disturbance is
     /// displayed, and the person responds to it. Default: only the error.
     pub display: Display,
@@ -42,7 +42,7 @@ impl Default for Task {
             sample_time: SampleTime::AT_60_HZ,
             measurement_s: 40.0,
             run_in_s: 5.0,
-            between_runs: 0.0,
+            spread_between_runs: 0.0,
             display: Display::Compensatory,
             preview_s: PREVIEW_S,
         }
@@ -114,10 +114,10 @@ impl Person {
         person: u64,
     ) -> Result<Self, SimError> {
         population.check()?;
-        if !(0.0..=1.0).contains(&task.between_runs) {
+        if !(0.0..=1.0).contains(&task.spread_between_runs) {
             return Err(SimError::Model(ModelError::OutOfRange {
                 quantity: "spread of the parameters between runs",
-                found: task.between_runs,
+                found: task.spread_between_runs,
                 expected: "0 to 1",
             }));
         }
@@ -213,7 +213,7 @@ impl Person {
     /// [`SimError::NoAcceptablePerson`] if no draw of the parameters gives a stable loop.
     pub fn run(&self, run: u64) -> Result<PersonRun, SimError> {
         let seed = self.run_seed(run);
-        if self.task.between_runs == 0.0 {
+        if self.task.spread_between_runs == 0.0 {
             return Ok(PersonRun {
                 state: self.state.clone(),
                 feedforward: self.feedforward.clone(),
@@ -263,7 +263,7 @@ impl Task {
     fn spread(&self, operator: &FamilyOperator, z: &[f64]) -> Result<FamilyOperator, ModelError> {
         let kinds = operator.form().coordinates(operator.has_neuromuscular());
         let spread = |((x, kind), z): ((&f64, &Coordinate), &f64)| {
-            let by = self.between_runs * z;
+            let by = self.spread_between_runs * z;
             match kind {
                 Coordinate::LogOmega | Coordinate::LogZeta => x + by,
                 _ => x * by.exp(),

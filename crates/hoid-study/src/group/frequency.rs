@@ -20,7 +20,7 @@
 
 use std::path::Path;
 
-use hoid_ident::frequency::{DescribingFunction, DescriptionOptions, Line, describe_runs};
+use hoid_ident::frequency::{DescribingFunction, Line, RecordDescriptionOptions, describe_runs};
 use hoid_io::OutputTable;
 use hoid_model::{ContinuousTransferFunction, Detrend, ModelError, Record, uncertainty::Estimate};
 use hoid_numerics::statistics::mean;
@@ -175,14 +175,14 @@ fn write_describing_function(
         .map(str::parse)
         .transpose()
         .map_err(|error: ModelError| error.to_string())?;
-    let options = DescriptionOptions {
+    let options = RecordDescriptionOptions {
         excitation: settings.excitation.clone(),
         period_s: settings.period_s,
         controlled_element: element.clone(),
         offset_samples,
         // The trend was already removed when the runs were read.
         detrend: Detrend::None,
-        ..DescriptionOptions::default()
+        ..RecordDescriptionOptions::default()
     };
     let description = describe_runs(records, &options).map_err(|error| error.to_string())?;
     let found = &description.function;

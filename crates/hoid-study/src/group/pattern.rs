@@ -108,7 +108,7 @@ impl Pattern {
     }
 }
 
-/// True if a text matches a pattern in which `*` is the only placeholder.
+/// True if the text matches a pattern in which `*` is the only placeholder.
 pub(super) fn matches_any(pattern: &str, text: &str) -> bool {
     let mut parts = Vec::new();
     for (i, fixed) in pattern.split('*').enumerate() {

@@ -164,7 +164,7 @@ impl PeopleExperiment {
     fn draw_person(&self, subject: u64, place: u64, plant: Plant) -> Result<Person, StudyError> {
         let task = Task {
             sample_time: self.sample_time,
-            between_runs: self.between_runs,
+            spread_between_runs: self.between_runs,
             ..Task::default()
         };
         let kind = self.remnants[(subject - 1) as usize % self.remnants.len()];

@@ -278,7 +278,10 @@ impl EstimatorCell {
                 .with_orders(asked, scenario)
                 .map_err(|error| ("orders", error.to_string()))?;
             if let Some((name, known)) = analysis::unknown_parameter(&asked) {
-                let reason = format!("fix or bound has {name}, expected one of {}", known.join(", "));
+                let reason = format!(
+                    "fix or bound names the parameter {name}, expected one of {}",
+                    known.join(", ")
+                );
                 return Err(("fix", reason));
             }
         }

@@ -72,7 +72,7 @@ impl Variant {
     }
 }
 
-/// Returns the line of the byte at position `byte` of a text, counted from 1.
+/// Returns the line of the byte at position `byte` of the text, counted from 1.
 pub fn line_at(text: &str, byte: usize) -> usize {
     1 + text.as_bytes()[..byte.min(text.len())]
         .iter()

@@ -20,7 +20,7 @@ pub fn content(directory: &Path) -> BTreeMap<String, Vec<u8>> {
         .collect()
 }
 
-/// Returns a column of texts.
+/// Returns a column of strings.
 pub fn texts<'a>(table: &'a OutputTable, name: &str) -> &'a [String] {
     match table.column(name) {
         Some(ColumnValues::Text(values)) => values,

@@ -17,7 +17,7 @@ pub struct SurveyPlan {
 }
 
 impl SurveyPlan {
-    /// Reads and checks the texts of a study and of its comparators.
+    /// Parses and checks a study and its comparators.
     ///
     /// # Errors
     /// [`ThesisError::Study`] if the study is invalid; [`ThesisError::Unsuited`] or [`ThesisError::Estimator`] if a

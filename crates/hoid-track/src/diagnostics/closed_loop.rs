@@ -1,4 +1,4 @@
-//! Test of whether e responds to u beyond chance.
+//! Tests whether e responds to u beyond chance.
 //!
 //! In a closed loop the latest u improves the prediction of e from earlier errors and outputs ([`loop_response()`]).
 //! The share of the prediction errors that it explains may be small: the target, which cannot be predicted either, and

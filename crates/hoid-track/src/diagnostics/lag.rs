@@ -1,4 +1,4 @@
-//! Test of whether the lag of the basis, which the method keeps constant, is that of the person.
+//! Tests whether the lag of the basis, which the method keeps constant, is that of the person.
 //!
 //! Gains, poles and delay are tracked, but the lag is not: with a lag of 3 s in the basis, the phase at .5 rad/s of a
 //! person with a lag of 8 s is wrong by about 15 deg. If the response at low frequencies has a lag, the operator of the

@@ -124,9 +124,9 @@ fn lead_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
         Finding::warning(
             "negative-lead",
             format!(
-                "the lead T_L is negative in {:.0} % of the rows, by two standard errors of K_e and of K_e_dot: a gain \
-                 and a lead do not describe this person, who may have a lag; K_e, T_L and K_e_dot are then not \
-                 parameters of the person, and only the response is valid; use hoid identify to find the form",
+                "the lead T_L is negative in {:.0} % of the rows, by at least two standard errors of K_e and of \
+                 K_e_dot: a gain and a lead do not describe this person, who may have a lag; K_e, T_L and K_e_dot are \
+                 then not parameters of the person, and only the response is valid; use hoid identify to find the form",
                 100.0 * negative
             ),
         )
@@ -146,7 +146,8 @@ fn undetermined_gains_finding(rows_with: &ShareOfRows<'_>, remembers: bool) -> O
         return Some(Finding::undetermined(
             "gain",
             format!(
-                "in {} of the rows no gain differs from zero by two standard errors: there is too little response to e{why}",
+                "in {} of the rows no gain differs from zero by at least two standard errors: there is too little \
+                 response to e{why}",
                 percent(both)
             ),
         ));
@@ -167,8 +168,8 @@ fn undetermined_gains_finding(rows_with: &ShareOfRows<'_>, remembers: bool) -> O
         Finding::note(
             "undetermined-parameter",
             format!(
-                "in {} of the rows the gain differs from zero by two standard errors, but the lead does not: the \
-                 person responds as a pure gain, and T_L and K_e_dot are not parameters of the person",
+                "in {} of the rows the gain differs from zero by at least two standard errors, but the lead does not: \
+                 a pure gain describes the person equally well, and T_L and K_e_dot are not determined",
                 percent(no_lead)
             ),
         )

@@ -192,7 +192,8 @@ impl Trace {
         nothing.then(|| {
             Finding::warning(
                 "last-row",
-                "at the end of the record no gain differs from zero by two standard errors: report an earlier row",
+                "at the end of the record no gain differs from zero by at least two standard errors: report an \
+                 earlier row",
             )
             .over(self.times_s()[last], self.times_s()[last])
         })

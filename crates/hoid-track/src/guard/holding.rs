@@ -80,7 +80,7 @@ impl Guard {
     }
 
     /// True if tracking can explain an excursion of a signal that ends with sample x at index `place` of the ring: it
-    /// starts with a jump and does not end with one. In e this is a step of the target, in u a movement of the hand,
+    /// starts with a jump and does not end with one. In e this is a step in the target, in u a movement of the hand,
     /// which returns over several samples.
     fn is_tracking(&self, c: usize, place: usize, held: u32, size: f64, x: f64, largest_move: f64) -> bool {
         let Some(last) = place.checked_sub(1).map(|k| self.ring[k].values[c]) else {
@@ -153,7 +153,7 @@ impl Guard {
             self.start_pause(GuardKind::Missing, c, held, 0.0);
             return self.process_paused(recursion, sample);
         }
-        // A step of the target moves e at once, after which e varies as before; the person responds only after the
+        // A step in the target moves e at once, after which e varies as before; the person responds only after the
         // delay.
         let ring = &self.ring[..self.in_ring];
         // The number of held-back samples exceeds that in the ring only if the saved numbers were altered.

@@ -10,12 +10,12 @@
 //! | frozen, idle, larger or rescaled, swapped, misfit (tested in blocks of a second) | the samples, for the filters only | restored to a state before the fault | the estimate is updated again once the span is over and the filters have settled |
 //! | an estimate that has diverged according to [`hoid_core::guard::reference`] | the samples, for the filters only | restored to the start | the estimate is updated again once the filters have settled |
 //!
-//! **Steps and pulses.** `e = r - y`: a step of the target moves e by the same amount within one sample, while y and u
+//! **Steps and pulses.** `e = r - y`: a step in the target moves e by the same amount within one sample, while y and u
 //! continue smoothly, since the person responds only after the delay. A lasting jump of e, after which e moves as
 //! before while u continues as predicted, is therefore tracking and is not reported, up to [`STEP_TO_LEVEL_RATIO`]
 //! times the largest level. The same limit applies to both signals while the person responds to the step. A disturbed
 //! sensor recovers as fast as it failed: an excursion that ends with a jump is an outlier; one of e that ends without
-//! a jump is a small step of the target. A fast hand leaves a dead zone at once but returns over several samples: an
+//! a jump is a small step in the target. A fast hand leaves a dead zone at once but returns over several samples: an
 //! excursion of u of [`MIN_PULSE_S`] or more within [`MAX_PULSE_SIZE`] times its mean magnitude, whose last step is
 //! within the normal moves of u, is a pulse and is used as recorded.
 //!
@@ -94,7 +94,7 @@ const MIN_SNAPSHOT_AGE: u64 = 4;
 const FOLLOWING_BLOCKS: u32 = 6;
 /// Multiple of the typical mean magnitude beyond which the level of a signal has changed.
 const MAX_LEVEL_RATIO: f64 = 30.0;
-/// Ratio of the largest step of a target to the largest level of a signal.
+/// Ratio of the largest step in a target to the largest level of a signal.
 const STEP_TO_LEVEL_RATIO: f64 = 10.0;
 /// Smallest size of an outlier as a multiple of the mean magnitude: e passes a low-pass filter before it reaches an
 /// innovation, while u enters the innovation directly.

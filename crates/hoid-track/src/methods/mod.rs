@@ -96,7 +96,7 @@ impl Method {
     /// Sets an option from its text.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for an option that the method does not have, or a text that is not a valid value.
+    /// [`IdentError::BadOption`] for an option that the method does not have, or text that is not a valid value.
     pub fn set(&mut self, name: &str, text: &str) -> Result<(), IdentError> {
         if self.0.set(name, text)? {
             return Ok(());

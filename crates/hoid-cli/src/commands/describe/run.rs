@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use hoid::analysis::{DescribingFunctionOptions, without_offsets};
-use hoid::ident::frequency::DescriptionOptions;
+use hoid::ident::frequency::RecordDescriptionOptions;
 use hoid::report::figures;
 use serde_json::Value;
 
@@ -29,13 +29,13 @@ pub fn run(args: &DescribeArgs) -> Result<(), CliError> {
     let (reading, offsets) = without_offsets(&reading::of(&args.read, Some(&args.mask), true)?);
     let read = reading.read_files(&args.records, reading::report_problems)?;
     let describing = DescribingFunctionOptions {
-        options: DescriptionOptions {
+        options: RecordDescriptionOptions {
             excitation: args.excitation.clone(),
             lines_rad_s: args.lines.clone(),
             period_s: args.period,
             controlled_element: args.controlled_element.clone(),
             // The span was selected and the trend removed when the records were read.
-            ..DescriptionOptions::default()
+            ..RecordDescriptionOptions::default()
         },
         offsets,
         faults: args.faults.faults,

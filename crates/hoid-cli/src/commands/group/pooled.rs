@@ -1,5 +1,5 @@
-//! `hoid group --pool`: estimates for people with partial pooling, and the population of each condition, as files and
-//! on the page.
+//! `hoid group --pool`: writes the partially pooled estimates of the people and the population of each condition to
+//! files, and shows them on the page.
 
 use std::path::{Path, PathBuf};
 

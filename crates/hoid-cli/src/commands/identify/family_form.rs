@@ -301,7 +301,7 @@ impl FamilyReport<'_> {
                 )
             });
             page.push_str(&format!(
-                "Agreement of the methods over {} that the data determine: {}; all together {}.\n",
+                "Agreement of the methods over {} that the data determine: {}; joint test {}.\n",
                 numbers::count_with_noun(agreement.rows.len(), "coordinate"),
                 pairs.collect::<Vec<_>>().join(", "),
                 format_p_value(agreement.p_value)

@@ -340,12 +340,12 @@ fn json_number(value: &Value) -> Result<f64, Fault> {
     }
 }
 
-/// True if a text is a single JSON object, possibly over several lines.
+/// True if the text is a single JSON object, possibly over several lines.
 pub fn is_object(text: &str) -> bool {
     text.trim_start().starts_with('{') && serde_json::from_str::<IgnoredAny>(text).is_ok()
 }
 
-/// Returns a text in quotation marks, shortened to a readable length.
+/// Returns the text in quotation marks, shortened to a readable length.
 fn quote(text: &str) -> String {
     let cut: String = text.chars().take(MAX_CELL_CHARS).collect();
     let rest = if text.chars().count() > MAX_CELL_CHARS {

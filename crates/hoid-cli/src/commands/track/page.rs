@@ -268,7 +268,7 @@ fn change_list(tracked: &TrackingResult) -> String {
             "Change at {:.2} s, declared at {t:.2} s: {}; log odds {:.1}.\n",
             t - c.seconds_ago,
             if changed.is_empty() {
-                "no single quantity changed by two standard errors".to_owned()
+                "no single quantity changed by more than two standard errors".to_owned()
             } else {
                 changed.join(", ")
             },

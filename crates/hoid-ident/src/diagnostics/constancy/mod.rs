@@ -1,4 +1,4 @@
-//! Test of whether the parameters of a fit are constant, based on the scores over time.
+//! Tests whether the parameters of a fit are constant, based on the scores over time.
 //!
 //! At the minimum the scores `s(t) = psi(t) eps(t)` sum to zero. If a parameter changes within a record or from one run
 //! to the next, the scores tend to have one sign before the change and the other sign after it (J. Nyblom, *JASA* 84

@@ -1,4 +1,4 @@
-//! Test of whether a response is constant: jumps, drifts and periodic changes of its gain and of its delay.
+//! Tests whether a response is constant: jumps, drifts and periodic changes of its gain and of its delay.
 //!
 //! The response is `u = sum b_i z_i + v` with columns `z_{i+1} = dz_i/dt`. A change in the gain has the direction b; a
 //! change in the delay has the direction `-db/dt`, i.e. `-b_i` at `z_{i+1}`. To first order, an increase in the lead is

@@ -23,8 +23,8 @@ fn unshifted_columns(columns: &[Vec<f64>]) -> Vec<LaggedColumn<'_>> {
         .collect()
 }
 
-/// Returns the product by its definition: `count` partial sums, added in this order, and then the samples after the
-/// last whole block.
+/// Returns the product by its definition: `count` partial sums, added in a fixed order, plus the sum over the samples
+/// after the last whole block.
 fn product_in_partial_sums(x: &[f64], y: &[f64], count: usize) -> f64 {
     let mut sums = [0.0; 8];
     let whole = x.len() - x.len() % count;

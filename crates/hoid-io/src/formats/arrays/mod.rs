@@ -1,4 +1,4 @@
-//! Files of named arrays: NPZ, MATLAB, XDF. The contents of a file are a list of paths, each with an array, a text or
+//! Files of named arrays: NPZ, MATLAB, XDF. The contents of a file are a list of paths, each with an array, text or
 //! unsupported content; this module builds records and tables from the list in the same way for all formats.
 //!
 //! | module | contents |

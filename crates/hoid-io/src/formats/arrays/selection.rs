@@ -87,10 +87,10 @@ pub(crate) fn table_of<'a>(contents: Contents, options: &ReadOptions, file: &'a 
         Some((own, reference)) if counted && !clocks::are_equal(own, reference) => Ok((
             None,
             Some(format!(
-                "{} has the times {}, which differ from {}: with --fs these times are ignored, and rows of the same \
-                 number are taken together",
-                abbreviate(&column_path.path),
+                "the times {} of {} differ from {}: with --fs the times are ignored, and rows are matched by row \
+                 number",
                 abbreviate(&own.path),
+                abbreviate(&column_path.path),
                 abbreviate(&reference.path)
             )),
         )),
@@ -221,7 +221,7 @@ fn column(name: &str, column_path: &ColumnPath, numbers: &Numbers) -> Column {
         },
         values,
         texts: Vec::new(),
-        moments: column_path.unit == CLOCK_TIME_UNIT,
+        is_clock_time: column_path.unit == CLOCK_TIME_UNIT,
         filled_rows: Vec::new(),
         is_held: false,
     }
@@ -423,7 +423,7 @@ mod tests {
         // With a given sampling frequency, the times in the file are ignored.
         let counted = read(0.53, |options| options.sampling_hz = Some(10.0)).unwrap();
         assert_eq!((counted.rows, values(&counted, "e")[1]), (20, 0.1 * 3.0));
-        assert!(counted.notes[0].contains("err.signals.e has the times err.time, which differ from stick.time"));
+        assert!(counted.notes[0].contains("the times err.time of err.signals.e differ from stick.time"));
     }
 
     #[test]

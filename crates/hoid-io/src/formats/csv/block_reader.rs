@@ -42,7 +42,7 @@ pub(crate) fn table<'a>(path: &Path, file: &'a str, options: &ReadOptions) -> Re
     read_long_table(path, file, options, MIN_LONG_FILE_BYTES)
 }
 
-/// Reads the table of a text of at least `long` bytes.
+/// Reads the table of a file of at least `long` bytes.
 fn read_long_table<'a>(
     path: &Path,
     file: &'a str,
@@ -72,7 +72,7 @@ fn read_long_table<'a>(
     };
     let separator = parsed.separator;
     let names: Vec<String> = parsed.columns.iter().map(|column| column.name.clone()).collect();
-    // If a column is missing, the reader of whole texts reports it with a list of all existing columns.
+    // If a column is missing, the reader of whole files reports it with a list of all existing columns.
     let known: Vec<&str> = names.iter().map(String::as_str).collect();
     if check_selected(&known, options, file).is_err() {
         return Ok(None);
@@ -174,7 +174,7 @@ impl LongText {
         }
         self.file.seek(SeekFrom::Start(self.position as u64))?;
         let is_plain = |parsed: &ParsedText| {
-            let numbers = parsed.columns.iter().all(|column| !column.moments);
+            let numbers = parsed.columns.iter().all(|column| !column.is_clock_time);
             numbers && !parsed.commas && parsed.starts.len() == parsed.rows
         };
         let parsed = std::str::from_utf8(&bytes)

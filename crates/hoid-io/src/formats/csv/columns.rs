@@ -81,7 +81,7 @@ impl CsvColumns {
     fn writer<'a>(&self, file: &'a mut dyn Write) -> csv::Writer<&'a mut dyn Write> {
         csv::WriterBuilder::new()
             .delimiter(self.separator)
-            // With this setting, texts that start with # are quoted.
+            // With this setting, text cells that start with # are quoted.
             .comment(Some(b'#'))
             .from_writer(file)
     }

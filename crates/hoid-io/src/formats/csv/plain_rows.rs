@@ -1,11 +1,11 @@
 //! Fast reader for rows of plain numbers; nearly all rows of a recording are plain.
 //!
 //! A row is plain if each cell of a requested column is empty or a number with a decimal point, with only blanks around
-//! it; cells of other columns may contain any text without quotes. Any other row (texts, quotes, comments, too many or
+//! it; cells of other columns may contain any text without quotes. Any other row (text, quotes, comments, too many or
 //! too few cells) ends the run and is read by the full CSV reader ([`super::table`]). Both readers round correctly and
 //! return the same numbers (D. Lemire, *Software: Practice and Experience* 51 (2021) 1700-1727).
 //!
-//! A long text is divided at line ends into parts that are read in parallel. For each part the reader reports the
+//! A long file is divided at line ends into parts that are read in parallel. For each part the reader reports the
 //! position of the first row that is not plain; parts after this row are discarded.
 
 use std::ops::Range;

@@ -47,7 +47,7 @@ impl CsvSource<'_> {
     }
 }
 
-/// Returns the position and the cells of the n-th row of a text that starts with a row.
+/// Returns the position and the cells of the n-th row of text that starts with a row.
 pub(super) fn nth_row(bytes: &[u8], n: usize, separator: u8) -> Option<(usize, csv::ByteRecord)> {
     let records = reader(bytes, separator).into_byte_records().map_while(Result::ok);
     let record = records.filter(|record| !is_blank_line(record)).nth(n)?;
@@ -86,7 +86,7 @@ impl Source for CsvSource<'_> {
     }
 }
 
-/// The columns of a text, and the positions of its rows.
+/// The columns of the text, and the positions of its rows.
 pub(super) struct ParsedText {
     pub(super) columns: Vec<Column>,
     pub(super) rows: usize,
@@ -158,7 +158,7 @@ fn refuse_thousands(column: &mut Column, cell: impl Fn(usize) -> String) {
     }
 }
 
-/// Reads the columns of a text.
+/// Reads the columns of the text.
 pub(super) fn parse_text(text: &str, file: &str) -> Result<ParsedText, IoError> {
     let lines = joined_lines(text).map(|(_, line)| line);
     let mut lines = lines.filter(|line| !is_comment_or_blank(line));
@@ -251,7 +251,7 @@ fn first_record(bytes: &[u8], separator: u8) -> Option<(csv::ByteRecord, Range<u
 /// Number of rows that the full CSV reader reads before the fast reader is tried again.
 const FULL_READER_ROWS: usize = 256;
 
-/// Reader that adds the rows of a text to the columns of a table.
+/// Reader that adds the rows of the text to the columns of a table.
 struct RowReader<'a> {
     file: &'a str,
     bytes: &'a [u8],
@@ -511,7 +511,7 @@ mod tests {
     }
 
     /// The full CSV reader reads quoted cells; without quotes, the fast reader reads rows of numbers in several parts.
-    /// Both readers give the same bits, texts, precision and positions.
+    /// Both readers give the same bits, text cells, precision and positions.
     #[test]
     fn fast_reader_matches_the_full_csv_reader() {
         let mut state = 7_u64;
@@ -547,7 +547,10 @@ mod tests {
         let [plain, quoted] = [&plain, &quoted].map(|bytes| parse(bytes, "run.csv").unwrap());
         assert_eq!(plain.rows, quoted.rows);
         for (at, (a, b)) in plain.columns.iter().zip(&quoted.columns).enumerate() {
-            assert_eq!((&a.texts, a.precision, a.moments), (&b.texts, b.precision, b.moments));
+            assert_eq!(
+                (&a.texts, a.precision, a.is_clock_time),
+                (&b.texts, b.precision, b.is_clock_time)
+            );
             for (row, (a, b)) in a.values.iter().zip(&b.values).enumerate() {
                 assert!(
                     a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan()),
@@ -602,16 +605,16 @@ mod tests {
             let [t, _] = table.columns.as_slice() else {
                 panic!("two columns")
             };
-            (t.values.clone(), t.texts.clone(), t.moments)
+            (t.values.clone(), t.texts.clone(), t.is_clock_time)
         };
-        let (t, texts, moments) = values("10:11:59.98,1\n10:12:00.00,1\n,1\n10:12:00.04,1\n");
+        let (t, texts, is_clock_time) = values("10:11:59.98,1\n10:12:00.00,1\n,1\n10:12:00.04,1\n");
         assert_eq!((t[0], t[1], t[3]), (0.0, 0.02, 0.06));
-        assert!(t[2].is_nan() && texts.is_empty() && moments);
+        assert!(t[2].is_nan() && texts.is_empty() && is_clock_time);
         // If a number or another text is among the clock times, the column does not hold clock times.
         for other in ["1", "abc"] {
-            let (t, texts, moments) = values(&format!("10:11:59,1\n,1\n{other},1\n10:12:00,1\n"));
+            let (t, texts, is_clock_time) = values(&format!("10:11:59,1\n,1\n{other},1\n10:12:00,1\n"));
             assert_eq!(texts, if other == "1" { vec![0, 3] } else { vec![0, 2, 3] });
-            assert!(!moments && (t[0].is_nan() && t[3].is_nan()));
+            assert!(!is_clock_time && (t[0].is_nan() && t[3].is_nan()));
         }
     }
 

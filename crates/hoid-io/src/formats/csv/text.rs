@@ -29,7 +29,7 @@ fn is_formula(cell: &str) -> bool {
     cell.starts_with(FORMULA_STARTS) && !["-", "+"].contains(&cell) && !matches!(Cell::parse(cell), Cell::Number(_))
 }
 
-/// Returns a text as it is written to the file: a text that a spreadsheet would execute is preceded by an apostrophe,
+/// Returns a cell as it is written to the file: a cell that a spreadsheet would execute is preceded by an apostrophe,
 /// which marks it as text and which [`unescape_formula`] removes.
 pub(crate) fn escape_formula(cell: &str) -> Cow<'_, str> {
     if is_formula(cell.trim_start_matches('\'')) {

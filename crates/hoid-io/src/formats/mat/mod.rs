@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `read` | reading of the variables of a file of any version |
 //! | `elements` | tags and data of version 5, with detection of damage |
-//! | `version5` | versions 5 to 7: arrays, structures, cells, texts |
+//! | `version5` | versions 5 to 7: arrays, structures, cells, strings |
 //! | `version4` | version 4: matrices |
 //! | `version73` | version 7.3, which is HDF5, and other HDF5 files |
 //! | `records` | tables of records in HDF5 |

@@ -16,7 +16,7 @@ const CHAR: u32 = 4;
 const DOUBLE: u32 = 6;
 const UINT64: u32 = 15;
 
-/// Writes the columns, and the comments as a cell array of texts.
+/// Writes the columns, and the comments as a cell array of strings.
 pub(super) fn write(file: &mut dyn Write, schema: &TableSchema, columns: &[Values<'_>]) -> io::Result<()> {
     // Neither the time of writing nor a path is written, so the same columns give the same bytes.
     let mut header = format!("MATLAB 5.0 MAT-file, written by hoid {}", env!("CARGO_PKG_VERSION")).into_bytes();

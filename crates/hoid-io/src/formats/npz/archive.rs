@@ -1,7 +1,7 @@
 //! The zip archive around the arrays: each member `name.npy` is the array `name`.
 //!
 //! Reading accepts stored and deflated members. Writing stores the members without times, so the same columns give the
-//! same bytes; `numpy.savez` also stores them uncompressed. Trailing null characters of texts are lost, since numpy's
+//! same bytes; `numpy.savez` also stores them uncompressed. Trailing null characters of strings are lost, since numpy's
 //! text type cannot hold them.
 
 use std::io::{self, Cursor, Read, Write};
@@ -97,7 +97,7 @@ fn archive_error(error: &ZipError, place: &str, file: &str) -> IoError {
     }
 }
 
-/// Writes the columns, and the comments as an array of texts.
+/// Writes the columns, and the comments as an array of strings.
 pub(super) fn write(file: &mut dyn Write, schema: &TableSchema, columns: &[Values<'_>]) -> io::Result<()> {
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
     let options = SimpleFileOptions::default()

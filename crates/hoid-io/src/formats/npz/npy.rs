@@ -52,7 +52,7 @@ enum Item {
     Clock {
         big_endian: bool,
         unit_s: f64,
-        moments: bool,
+        is_clock_time: bool,
     },
     Unread {
         what: &'static str,
@@ -90,7 +90,7 @@ impl Item {
                     Some(unit_s) => Self::Clock {
                         big_endian,
                         unit_s,
-                        moments: letter == 'M',
+                        is_clock_time: letter == 'M',
                     },
                     None => unread("dates or times", Some(8)),
                 };
@@ -104,8 +104,12 @@ impl Item {
     /// Returns the unit that the type implies; empty if there is none.
     fn unit(&self) -> String {
         String::from(match self {
-            Self::Clock { moments: true, .. } => CLOCK_TIME_UNIT,
-            Self::Clock { moments: false, .. } => "s",
+            Self::Clock {
+                is_clock_time: true, ..
+            } => CLOCK_TIME_UNIT,
+            Self::Clock {
+                is_clock_time: false, ..
+            } => "s",
             _ => "",
         })
     }
@@ -242,9 +246,9 @@ fn plain_value(item: &Item, header: &Header, data: Vec<u8>) -> Result<Value, Npy
         Item::Clock {
             big_endian,
             unit_s,
-            moments,
+            is_clock_time,
         } => Value::Array(Array {
-            numbers: clock_seconds(&Numbers::new(data, Kind::I64, *big_endian), *unit_s, *moments),
+            numbers: clock_seconds(&Numbers::new(data, Kind::I64, *big_endian), *unit_s, *is_clock_time),
             dims: header.shape.clone(),
             is_row_major: !header.fortran_order,
         }),
@@ -272,11 +276,17 @@ fn clock_unit_s(descr: &str) -> Option<f64> {
 }
 
 /// Converts the counts of a clock to s, for clock times relative to the first one; an invalid count (NaT) becomes NaN.
-fn clock_seconds(counts: &Numbers, unit_s: f64, moments: bool) -> Numbers {
+fn clock_seconds(counts: &Numbers, unit_s: f64, is_clock_time: bool) -> Numbers {
     let known: Vec<Option<i64>> = (0..counts.len())
         .map(|at| counts.integer(at).filter(|n| *n != i64::MIN))
         .collect();
-    let first = known.iter().flatten().next().copied().filter(|_| moments).unwrap_or(0);
+    let first = known
+        .iter()
+        .flatten()
+        .next()
+        .copied()
+        .filter(|_| is_clock_time)
+        .unwrap_or(0);
     // Dividing by 1e9 keeps digits that multiplying by 1e-9 would lose.
     let seconds = |count: i64| {
         let count = i128::from(count).saturating_sub(i128::from(first)) as f64;

@@ -211,7 +211,7 @@ mod tests {
 
     const GZIP: fn() -> Compression = || Compression::GZIP(GzipLevel::default());
 
-    /// Returns a data page whose header also has a text and a list, which are skipped.
+    /// Returns a data page whose header also has a string and a list, which are skipped.
     fn data_page(unpacked: i64, values: i64, packed: &[u8]) -> Vec<u8> {
         let put = |bytes: &mut Vec<u8>, value: i64| {
             let mut rest = ((value << 1) ^ (value >> 63)).cast_unsigned();
@@ -227,7 +227,7 @@ mod tests {
         put(&mut bytes, unpacked);
         bytes.push(0x15);
         put(&mut bytes, packed.len() as i64);
-        // Field 5 contains the number of values, and statistics with a text and a list.
+        // Field 5 contains the number of values, and statistics with a string and a list.
         bytes.extend([0x2c, 0x15]);
         put(&mut bytes, values);
         bytes.extend([0x4c, 0x18, 3, b'a', b'b', b'c', 0x19, 0x25, 2, 4, STOP, STOP, STOP]);

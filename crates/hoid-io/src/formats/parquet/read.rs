@@ -33,7 +33,7 @@ const TIME_DESCRIPTION: &str = "a date or time";
 /// Number of ns in a µs and in a ms.
 const NS_PER_US: i64 = 1_000;
 const NS_PER_MS: i64 = 1_000_000;
-/// Memory in bytes of a value (as a number and as the index of a missing value), or of a text without its characters.
+/// Memory in bytes of a value (as a number and as the index of a missing value), or of a string without its characters.
 const VALUE_BYTES: u64 = 16;
 const TEXT_BYTES: u64 = 24;
 /// Number of values read at a time.

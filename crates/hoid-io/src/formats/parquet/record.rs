@@ -112,7 +112,7 @@ fn column_of(read: ReadColumn, rows: usize) -> (Column, Cells) {
             let known = |row: &usize| nulls.binary_search(row).is_err();
             let first = (moments.iter().enumerate()).find(|(row, _)| known(row));
             let first = first.map_or(0, |(_, moment)| *moment);
-            column.moments = true;
+            column.is_clock_time = true;
             column.unit = String::from("s");
             column.values = moments.into_iter().map(|ns| seconds_between(ns, first)).collect();
             mark_missing(&mut column.values, &nulls);

@@ -1,4 +1,4 @@
-//! XDF: excessive numbers of channels, samples, texts and streams, jumps in time, nested headers.
+//! XDF: excessive numbers of channels, samples, strings and streams, jumps in time, nested headers.
 
 use crate::mutations::draw::Draw;
 
@@ -22,7 +22,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
             append_chunk(&mut file, HEADER, &stream_header(1, 2, kind, "100", ""));
             append_chunk(&mut file, SAMPLES, &samples_chunk(&u64::MAX.to_le_bytes(), &[0; 64]));
         }
-        // Texts of any length, and empty texts.
+        // Strings of any length, and empty strings.
         2 => {
             append_chunk(&mut file, HEADER, &stream_header(1, 1, "string", "0", ""));
             let text = [&[0, 8][..], &large.to_le_bytes()].concat();

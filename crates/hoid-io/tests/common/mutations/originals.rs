@@ -1,4 +1,4 @@
-//! The valid files: files that hoid writes, files of other programs (`fixtures/`), and texts with all features of CSV.
+//! The valid files: files that hoid writes, files of other programs (`fixtures/`), and CSV with all its features.
 
 use std::{fs, path::Path};
 

@@ -1,8 +1,8 @@
-//! Ring buffer of the signals of the last samples, which contains the signals for every delay.
+//! Ring buffer of the signals of the most recent samples, which contains the signals for every delay.
 //!
 //! The response to an error that is delayed by k more samples equals the response k samples earlier. One filter
-//! therefore gives the signals for all delays between the shortest and the longest; a ring buffer stores its last
-//! signals after the whitening filter.
+//! therefore gives the signals for all delays between the shortest and the longest; a ring buffer stores its most
+//! recent signals after the whitening filter.
 
 use super::response::Signals;
 
@@ -37,7 +37,7 @@ impl<'a> DelayedSignals<'a> {
     }
 }
 
-/// Ring buffer of the signals of the last samples; its length is the number of delays.
+/// Ring buffer of the signals of the most recent samples; its length is the number of delays.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SignalRing<B> {
     memory: B,

@@ -71,7 +71,7 @@ pub fn simulate_person(seed: u64, number: u64) -> Result<(Cell, Person, Vec<Reco
     let cell = Cell::of(number);
     let task = Task {
         sample_time: SampleTime::new(1.0 / f64::from(cell.rate_hz))?,
-        between_runs: if cell.spread == Spread::All {
+        spread_between_runs: if cell.spread == Spread::All {
             RUN_TO_RUN_SPREAD
         } else {
             0.0

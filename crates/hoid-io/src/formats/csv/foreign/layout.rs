@@ -71,7 +71,7 @@ fn names_with_other_separator<'a>(header: &'a str, rows: &[Vec<&str>]) -> Option
 }
 
 impl<'a> Layout<'a> {
-    /// Finds the structure of a text; `None` if no header is certain.
+    /// Finds the structure of the text; `None` if no header is certain.
     pub(super) fn of(text: &'a str, options: &ReadOptions) -> Option<Self> {
         let filled = non_blank_lines(text);
         let found = Separator::ALL

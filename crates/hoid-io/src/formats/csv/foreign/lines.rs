@@ -59,7 +59,7 @@ pub(super) fn is_missing(cell: &str) -> bool {
     Cell::parse(unquoted(cell)) == Cell::Missing
 }
 
-/// True if the cells can form a row: more of them are values than other texts.
+/// True if the cells can form a row: more of them are values than other text.
 pub(in crate::formats::csv) fn is_row(cells: &[&str]) -> bool {
     let values = cells.iter().filter(|cell| is_value(cell)).count();
     let missing = cells.iter().filter(|cell| !is_value(cell) && is_missing(cell)).count();
@@ -86,8 +86,8 @@ pub(super) fn is_open(line: &str) -> bool {
     open
 }
 
-/// Returns the lines of a text, each with its line end and the number of its first line in the file. Lines that a cell
-/// in quotation marks joins are one line.
+/// Returns the lines of the text, each with its line end and the number of its first line in the file. Lines that a
+/// cell in quotation marks joins are one line.
 pub(in crate::formats::csv) fn joined_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let mut rest = text;
     let mut number = 0_usize;
@@ -123,7 +123,7 @@ pub(super) fn split_line_end(line: &str) -> (&str, &str) {
     line.split_at_checked(inside.len()).unwrap_or((line, ""))
 }
 
-/// Returns the lines at the start of a text that are neither blank nor comments, with their indices.
+/// Returns the lines at the start of the text that are neither blank nor comments, with their indices.
 pub(super) fn non_blank_lines(text: &str) -> Vec<(usize, &str)> {
     let lines = joined_lines(text)
         .take(SEARCHED_LINES)
