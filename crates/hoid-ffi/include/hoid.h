@@ -99,14 +99,14 @@ typedef struct {
    */
   double after_standard_error;
   /*
-   Change divided by its standard error; for the remnant, the change of the logarithm divided by its standard
+   Change divided by its standard error; for the remnant, the change in the logarithm divided by its standard
    error.
    */
   double z;
 } hoid_shift;
 
 /*
- Declared change of the person.
+ Declared change in the person.
  */
 typedef struct {
   /*
@@ -179,7 +179,7 @@ typedef struct {
    */
   int32_t shortened;
   /*
-   1 if a change of the person was declared at this sample.
+   1 if a change in the person was declared at this sample.
    */
   int32_t changed;
 } hoid_outcome;
