@@ -134,7 +134,7 @@ pub enum StudyError {
         reason: String,
     },
     /// The manifest of a group is missing.
-    #[error("there is no {path}; write one with `hoid group init DIR`")]
+    #[error("there is no {path}, expected a manifest; in a directory of recordings, `hoid group init DIR` writes one")]
     NoManifest {
         /// Path where the manifest was expected.
         path: String,

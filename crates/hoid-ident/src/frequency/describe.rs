@@ -4,7 +4,7 @@ use hoid_model::{Channel, Complex64, Record, uncertainty::Estimate};
 use hoid_numerics::statistics::root_mean_square;
 
 use super::{
-    excitation::{Excitation, channel_values, refuse},
+    excitation::{COMMON_EXCITATIONS, Excitation, channel_values, refuse},
     options::{Averaging, DescribingOptions, Realisation},
     ratio::{Ratio, mean, standard_deviation},
     remnant::{ControlSpectrum, RemnantBand, remnant_share_and_noise_ratio, spectrum},
@@ -16,6 +16,10 @@ use crate::{IdentError, informative_data::common_sample_time};
 /// as a rounding error.
 const MIN_LINE_AMPLITUDE: f64 = 1e-12;
 
+/// Smallest power of a line of another excitation, relative to its largest line, and smallest number of bins for each
+/// line.
+const MIN_LINE_POWER: f64 = 1e-5;
+const MIN_BINS_PER_LINE: usize = 10;
 /// Number of bins at non-excited frequencies from which the remnant at a line is estimated.
 const NEIGHBOUR_COUNT: usize = 8;
 
@@ -123,6 +127,8 @@ struct Run {
     window: Window,
     e: Vec<Complex64>,
     u: Vec<Complex64>,
+    /// Bins of the lines of all recorded excitations, in ascending order.
+    excited: Vec<usize>,
     reference: Option<Vec<Complex64>>,
     /// Fourier coefficients of the output and of the input of the controlled element.
     element: Option<(Vec<Complex64>, Vec<Complex64>)>,
@@ -159,7 +165,7 @@ pub fn describe(
     let lines: Result<Vec<Line>, IdentError> = lines.map(|(&n, omega)| line(&runs, n, omega, options)).collect();
     let mut lines = lines?;
     for line in &mut lines {
-        line.neighbour_error = neighbour_error(&runs, line, excitation.harmonics());
+        line.neighbour_error = neighbour_error(&runs, line);
     }
 
     let controls: Vec<ControlSpectrum<'_>> = runs
@@ -167,15 +173,15 @@ pub fn describe(
         .map(|run| ControlSpectrum {
             coefficients: &run.u,
             window: run.window,
+            excited: &run.excited,
         })
         .collect();
-    let remnant_spectrum = spectrum(&controls, excitation.harmonics(), ts_s, options.smoothing_bins);
+    let remnant_spectrum = spectrum(&controls, ts_s, options.smoothing_bins);
     let runs: Vec<RunSummary> = runs
         .iter()
         .zip(&controls)
         .map(|(run, control)| {
-            let (share, ratio) =
-                remnant_share_and_noise_ratio(control, excitation.harmonics(), ts_s, &remnant_spectrum);
+            let (share, ratio) = remnant_share_and_noise_ratio(control, ts_s, &remnant_spectrum);
             RunSummary {
                 label: run.label.clone(),
                 periods: run.window.periods,
@@ -267,6 +273,7 @@ fn runs_of(record: &Record, excitation: &Excitation, options: &DescribingOptions
         Ok(Run {
             label: record.label().to_owned(),
             window,
+            excited: excited_bins(record, window, excitation),
             e: shifted_coefficients(pair.input(), 0.0),
             u: control,
             reference: reference.map(|r| window.coefficients(r, 0.0)),
@@ -280,6 +287,27 @@ fn runs_of(record: &Record, excitation: &Excitation, options: &DescribingOptions
         run.check_lines(record, excitation, options)?;
     }
     Ok(runs)
+}
+
+/// Returns the bins of the lines of an excitation, and of the other excitations that were recorded with it: u responds to
+/// all of them, and only the other bins contain remnant alone. A channel whose power is not concentrated at a few lines,
+/// such as filtered noise, excites all bins and is not included.
+fn excited_bins(record: &Record, window: Window, excitation: &Excitation) -> Vec<usize> {
+    let mut all: Vec<usize> = excitation.harmonics().iter().map(|n| n * window.periods).collect();
+    for channel in COMMON_EXCITATIONS.iter().filter_map(|name| record.other_channel(name)) {
+        let power: Vec<f64> = (window.coefficients(channel, 0.0).iter().skip(1))
+            .map(Complex64::norm_sqr)
+            .collect();
+        let largest = power.iter().copied().fold(0.0, f64::max);
+        let lines = (power.iter().enumerate()).filter(|(_, p)| **p > MIN_LINE_POWER * largest);
+        let lines: Vec<usize> = lines.map(|(k, _)| k + 1).collect();
+        if lines.len() * MIN_BINS_PER_LINE <= power.len() {
+            all.extend(lines);
+        }
+    }
+    all.sort_unstable();
+    all.dedup();
+    all
 }
 
 impl Run {
@@ -375,13 +403,13 @@ fn line(runs: &[Run], harmonic: usize, omega_rad_s: f64, options: &DescribingOpt
 
 /// Returns sigma of a line from the neighbouring bins: `sigma^2 = sum_i |D_i|^2 S_i / |sum_i b_i|^2`, where S_i is the
 /// mean of `|U - H E|^2` over the nearest non-excited bins of run i and `b_i = E_i D_i*`.
-fn neighbour_error(runs: &[Run], line: &Line, harmonics: &[usize]) -> f64 {
+fn neighbour_error(runs: &[Run], line: &Line) -> f64 {
     let mut squares = 0.0;
     for (run, (_, b)) in runs.iter().zip(&line.ratio.0) {
         let periods = run.window.periods;
-        let is_line = |k: usize| k.is_multiple_of(periods) && harmonics.binary_search(&(k / periods)).is_ok();
         let at = line.harmonic * periods;
-        let mut nearby_bins: Vec<usize> = (1..run.e.len()).filter(|&k| !is_line(k)).collect();
+        let is_remnant = |k: &usize| run.excited.binary_search(k).is_err();
+        let mut nearby_bins: Vec<usize> = (1..run.e.len()).filter(is_remnant).collect();
         nearby_bins.sort_by_key(|k| k.abs_diff(at));
         nearby_bins.truncate(NEIGHBOUR_COUNT);
         let power = |k: &usize| (run.u[*k] - line.response * run.e[*k]).norm_sqr();

@@ -25,9 +25,6 @@ use super::{
 };
 use crate::IdentError;
 
-/// Names of channels that commonly contain the excitation, in search order.
-pub const COMMON_EXCITATIONS: [&str; 8] = ["f_t", "d", "r", "f_d", "target", "disturbance", "reference", "forcing"];
-
 /// Minimum number of records for computing errors from the scatter between records.
 const MIN_RUNS: usize = 3;
 /// Largest plausible delay; longer delays are artefacts of noise in the phase.

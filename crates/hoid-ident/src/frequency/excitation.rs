@@ -22,6 +22,9 @@ const HARMONIC_TOLERANCE: f64 = 1e-4;
 /// Minimum share of the power of a channel at its lines.
 const MIN_LINE_POWER_SHARE: f64 = 0.99;
 
+/// Names of channels that commonly contain the excitation, in search order.
+pub const COMMON_EXCITATIONS: [&str; 8] = ["f_t", "d", "r", "f_d", "target", "disturbance", "reference", "forcing"];
+
 /// An excitation with lines at harmonics of one period.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Excitation {

@@ -62,9 +62,9 @@ pub(crate) use excitation::greatest_common_divisor;
 pub(crate) use window::Window;
 
 pub use describe::{DescribingFunction, Line, RunSummary, describe};
-pub use description::{COMMON_EXCITATIONS, Description, RecordDescriptionOptions, describe_runs};
+pub use description::{Description, RecordDescriptionOptions, describe_runs};
 pub use diagnostics::chance_coherence;
-pub use excitation::{Excitation, LineDetectionOptions, check_excitation};
+pub use excitation::{COMMON_EXCITATIONS, Excitation, LineDetectionOptions, check_excitation};
 pub use gain_lead_delay::{GainLeadDelay, GainLeadDelayOptions, LineWeights};
 pub use open_loop::{Crossover, DescribingMargins, OpenLoop};
 pub use options::{Averaging, DescribingOptions, MeasuredElement, Realisation};

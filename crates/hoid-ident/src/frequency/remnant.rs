@@ -35,10 +35,11 @@ impl RemnantBand {
     }
 }
 
-/// Fourier coefficients of u in one run.
+/// Fourier coefficients of u in one run, and its excited bins in ascending order.
 pub(super) struct ControlSpectrum<'a> {
     pub coefficients: &'a [Complex64],
     pub window: Window,
+    pub excited: &'a [usize],
 }
 
 impl ControlSpectrum<'_> {
@@ -46,8 +47,8 @@ impl ControlSpectrum<'_> {
         TAU / (self.window.samples as f64 * ts_s)
     }
 
-    fn is_line(&self, k: usize, harmonics: &[usize]) -> bool {
-        k.is_multiple_of(self.window.periods) && harmonics.binary_search(&(k / self.window.periods)).is_ok()
+    fn is_line(&self, k: usize) -> bool {
+        self.excited.binary_search(&k).is_ok()
     }
 
     fn power(&self, k: usize) -> f64 {
@@ -55,32 +56,24 @@ impl ControlSpectrum<'_> {
     }
 
     /// Returns the variance of u, and the part of it at non-excited frequencies.
-    fn total_and_remnant_power(&self, harmonics: &[usize]) -> (f64, f64) {
+    fn total_and_remnant_power(&self) -> (f64, f64) {
         let bins = 1..self.coefficients.len();
         let all: f64 = bins.clone().map(|k| self.power(k)).sum();
-        let off: f64 = bins
-            .filter(|k| !self.is_line(*k, harmonics))
-            .map(|k| self.power(k))
-            .sum();
+        let off: f64 = bins.filter(|k| !self.is_line(*k)).map(|k| self.power(k)).sum();
         (all, off)
     }
 }
 
 /// Returns the mean density in bands with the width of `neighbours` bins of the shortest window, over the non-excited
 /// bins of all runs.
-pub(super) fn spectrum(
-    runs: &[ControlSpectrum<'_>],
-    harmonics: &[usize],
-    ts_s: f64,
-    neighbours: usize,
-) -> Vec<RemnantBand> {
+pub(super) fn spectrum(runs: &[ControlSpectrum<'_>], ts_s: f64, neighbours: usize) -> Vec<RemnantBand> {
     let widest = runs.iter().map(|r| r.bin_width_rad_s(ts_s)).fold(0.0, f64::max);
     let band_rad_s = widest * neighbours.max(1) as f64;
     // For each band: sum of frequencies, sum of densities, and number of bins.
     let mut bands: Vec<(f64, f64, usize)> = Vec::new();
     for run in runs {
         let width = run.bin_width_rad_s(ts_s);
-        for k in (1..run.coefficients.len()).filter(|k| !run.is_line(*k, harmonics)) {
+        for k in (1..run.coefficients.len()).filter(|k| !run.is_line(*k)) {
             let omega = k as f64 * width;
             // The shift by half a bin assigns a frequency at the edge of two bands to the lower band, regardless of
             // rounding.
@@ -103,16 +96,13 @@ pub(super) fn spectrum(
 /// Returns, for one run, the share of the power of u at non-excited frequencies and the noise ratio.
 pub(super) fn remnant_share_and_noise_ratio(
     run: &ControlSpectrum<'_>,
-    harmonics: &[usize],
     ts_s: f64,
     spectrum: &[RemnantBand],
 ) -> (f64, f64) {
-    let (all, off) = run.total_and_remnant_power(harmonics);
+    let (all, off) = run.total_and_remnant_power();
     let width = run.bin_width_rad_s(ts_s);
-    let at_lines: f64 = harmonics
-        .iter()
-        .map(|h| (h * run.window.periods) as f64 * width)
-        .map(|omega| width * density_at(spectrum, omega))
+    let at_lines: f64 = (run.excited.iter())
+        .map(|&k| width * density_at(spectrum, k as f64 * width))
         .sum();
     (off / all, (off + at_lines) / all)
 }
@@ -145,12 +135,14 @@ mod tests {
             samples: n,
             periods: 2,
         };
+        // Harmonics 3, 5 and 40 of two periods.
+        let excited = [6, 10, 80];
         let run = ControlSpectrum {
             coefficients: &c,
             window,
+            excited: &excited,
         };
-        let harmonics = [3, 5, 40];
-        let (all, off) = run.total_and_remnant_power(&harmonics);
+        let (all, off) = run.total_and_remnant_power();
         let on: f64 = [6, 10, 80].iter().map(|k| power(&c, *k, n)).sum();
         assert!((all - on - off).abs() < 1e-14);
         let ts = 0.1;
@@ -160,8 +152,8 @@ mod tests {
                 &[ControlSpectrum {
                     coefficients: &c,
                     window,
+                    excited: &excited,
                 }],
-                &harmonics,
                 ts,
                 neighbours,
             );
@@ -169,7 +161,7 @@ mod tests {
             assert!((sum - off).abs() < 1e-14 * n as f64, "{neighbours}");
             assert_eq!(bands.iter().map(|b| b.values).sum::<usize>(), 256 - 3);
             assert!(bands.windows(2).all(|b| b[0].omega_rad_s < b[1].omega_rad_s));
-            let (share, ratio) = remnant_share_and_noise_ratio(&run, &harmonics, ts, &bands);
+            let (share, ratio) = remnant_share_and_noise_ratio(&run, ts, &bands);
             assert!((share - off / all).abs() < 1e-15 && ratio > share);
         }
         assert_eq!(density_at(&[], 1.0), 0.0);

@@ -46,6 +46,39 @@ fn element_is_found_despite_disturbance_and_offset() {
     assert!((open.response[1] - expected).norm() < 1e-14 && (open.per_run[0][1] - expected).norm() < 1e-14);
 }
 
+/// u follows a target and a disturbance with lines of their own, and contains a sinusoid between them: the remnant.
+#[test]
+fn lines_of_other_excitations_are_no_remnant() {
+    let sines = |all: &[(f64, f64)]| -> Vec<f64> {
+        let at = |k: u32, n: f64| (std::f64::consts::TAU * n * f64::from(k) / 400.0).sin();
+        (0..400).map(|k| all.iter().map(|&(n, a)| a * at(k, n)).sum()).collect()
+    };
+    let (target, disturbance) = ([(4.0, 1.0), (9.0, 0.5)], [(3.0, 1.0), (7.0, 1.0)]);
+    let both: Vec<(f64, f64)> = target.into_iter().chain(disturbance).collect();
+    let with_remnant: Vec<(f64, f64)> = both.iter().copied().chain([(30.0, 0.5)]).collect();
+    let of = |extra: Option<&[(f64, f64)]>| {
+        let record = record(sines(&both), sines(&with_remnant)).unwrap();
+        let record = record
+            .with_channel(Channel::new("d", "deg", sines(&disturbance)))
+            .unwrap();
+        let record = match extra {
+            Some(lines) => record.with_channel(Channel::new("r", "deg", sines(lines))).unwrap(),
+            None => record,
+        };
+        let excitation = Excitation::from_harmonics(&[3, 7], 40.0).unwrap();
+        describe(&[record], &excitation, &DescribingOptions::default())
+            .unwrap()
+            .off_line_share
+            .value
+    };
+    // Powers of 1/2, 1/8, 1/2, 1/2 and, for the remnant, 1/8.
+    assert!((of(Some(&target)) - 0.125 / 1.75).abs() < 1e-9);
+    assert!((of(None) - 0.75 / 1.75).abs() < 1e-9);
+    // A target with power everywhere excites all bins.
+    let noise: Vec<(f64, f64)> = (1..150).map(|n| (f64::from(n), 1.0)).collect();
+    assert!((of(Some(&noise)) - 0.75 / 1.75).abs() < 1e-9);
+}
+
 #[test]
 fn degenerate_input_is_refused() {
     let wave = |n: f64| -> Vec<f64> {
