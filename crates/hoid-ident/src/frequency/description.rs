@@ -16,7 +16,7 @@ use hoid_model::{ContinuousTransferFunction, Detrend, Record, Verdict, uncertain
 use super::{
     describe::{DescribingFunction, describe},
     diagnostics::{DiagnosticInputs, findings},
-    excitation::{Excitation, LineDetectionOptions, refuse},
+    excitation::{COMMON_EXCITATIONS, Excitation, LineDetectionOptions, refuse},
     gain_lead_delay::GainLeadDelayOptions,
     open_loop::DescribingMargins,
     options::{Averaging, DescribingOptions, Realisation},
