@@ -25,6 +25,7 @@ use crate::{
     Estimator, Fit, GreyBox, GreyBoxFit, SigmoidChange, SigmoidFit,
     family::{FamilyEstimator, FamilyFit},
     faults::{SLOW_PERIOD_S, limited_records, without_slow_components},
+    progress,
 };
 
 /// Components are slow if their period is longer than this number of periods of the slowest pole of a system.
@@ -135,7 +136,9 @@ pub fn polynomial_findings(
 /// direct estimate is compared only if nothing speaks against it.
 pub fn operator_finding(fit: &Fit, records: &[Record]) -> Option<Finding> {
     let converted = fit.operator().ok()?;
-    let direct = FamilyEstimator::default().fit_with_response(records, None).ok()?;
+    // The progress of the requested fit must not start again with the forms of this one.
+    let fit_directly = || FamilyEstimator::default().fit_with_response(records, None).ok();
+    let direct = progress::with_watcher(|_| {}, fit_directly)?;
     if direct.verdict.level != VerdictLevel::Trustworthy {
         return None;
     }
